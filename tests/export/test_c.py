@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from tests.export import tools
 from tests.softstart.export import translated
-from tests.softstart.export.test_translate import KINDS, NAMES, Attributes, filled, function_of
+from tests.softstart.export.test_translate import KINDS, NAMES, POWERS, Attributes, filled, function_of
 
 from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import Controller, make_controller
@@ -115,8 +115,7 @@ def test_statements_mean_what_they_mean_in_python(name: str, library: ctypes.CDL
     rng = np.random.default_rng(NAMES.index(name))
     function = getattr(translated, name)
     in_python = {key: getattr(one, "py_func", one) for key, one in vars(translated).items()}
-    # numba takes powers as products
-    same = unfused(function) if name == "powers" else types.FunctionType(function.__code__, in_python)
+    same = unfused(function) if name in POWERS else types.FunctionType(function.__code__, in_python)
     _, translator = function_of(function)
     outer = translator.structs.of(translated.OUTER)
     for _ in range(ROWS):

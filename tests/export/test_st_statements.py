@@ -457,6 +457,10 @@ def test_translated_functions_mean_what_they_mean_in_python(name: str) -> None:
     in_python = {key: getattr(one, "py_func", one) for key, one in vars(translated).items()}
     function = types.FunctionType(getattr(translated, name).__code__, in_python)
     text = Text("case")
+    if name == "quotients":
+        with pytest.raises(InputError, match="of real numbers has no counterpart in Structured Text"):
+            add_program(text, translator.program(made))
+        return
     add_program(text, translator.program(made))
     program, random = Interpreter(str(text)), np.random.default_rng(5)
     signature = text.signatures[made.name]
@@ -490,7 +494,7 @@ def test_translated_functions_mean_what_they_mean_in_python(name: str) -> None:
         values = wanted if isinstance(wanted, tuple) else () if wanted is None else (wanted,)
         found = result if len(made.returns) == 1 else result[1:]
         limited = [min(max(value, -(2.0**126)), 2.0**126) for value in map(float, values)]
-        room = 1e-15 if name == "powers" else 0.0  # Python rounds x**3 once, not twice
+        room = {"powers": 1e-15, "more_powers": 1e-14}.get(name, 0.0)  # Python rounds x**3 once
         assert [float(one) for one in found] == pytest.approx(limited, rel=room, abs=0.0), given
         for place, kind, held in records:
             assert taken(place, text, kind) == held

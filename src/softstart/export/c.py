@@ -8,6 +8,7 @@ are computed as Python does: in the order written, without fused operations, in 
 from __future__ import annotations
 
 import math
+import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -52,6 +53,7 @@ KEYWORDS = set(
 PRECEDENCE = {
     "or": 1, "and": 2, "==": 3, "!=": 3, "<": 4, "<=": 4, ">": 4, ">=": 4, "+": 5, "-": 5, "*": 6, "/": 6,
 }  # fmt: skip
+OWN = re.compile(r"result_\d+|unused_(truth|whole|real|double)")  # names that functions get here
 WORDS = {"and": "&&", "or": "||"}
 UNARY, ATOM = 7, 9
 HELPERS: dict[str, str] = {
@@ -62,19 +64,30 @@ HELPERS: dict[str, str] = {
     "floordiv": """\
 static {t} {p}(const {t} a, const {t} b)
 {{
-    return a / b - (a % b != 0 && (a < 0) != (b < 0));
+    return b == 0 ? 0 : a / b - (a % b != 0 && (a < 0) != (b < 0));
 }}""",
     "mod": """\
 static {t} {p}(const {t} a, const {t} b)
 {{
-    const {t} r = a % b;
+    const {t} r = b == 0 ? 0 : a % b;
     return r != 0 && (r < 0) != (b < 0) ? r + b : r;
 }}""",
     "fmod": """\
 static {t} {p}(const {t} a, const {t} b)
 {{
     const {t} r = fmod{f}(a, b);
-    return r != 0 && (r < 0) != (b < 0) ? r + b : r;
+    return r == 0 ? copysign{f}(0, b) : (r < 0) != (b < 0) ? r + b : r;
+}}""",
+    "ffloordiv": """\
+static {t} {p}(const {t} a, const {t} b)
+{{
+    const {t} r = fmod{f}(a, b);
+    const {t} quotient = (a - r) / b - (r != 0 && (r < 0) != (b < 0) ? 1 : 0);
+    const {t} whole = floor{f}(quotient);
+    if (b == 0) {{
+        return a / b;
+    }}
+    return quotient == 0 ? copysign{f}(0, a / b) : quotient - whole > ({t})0.5 ? whole + 1 : whole;
 }}""",
     "gauss": """\
 static uint64_t {p}_mixed(uint64_t z)
@@ -140,7 +153,7 @@ class CWriter:
     @staticmethod
     def name(name: str) -> str:
         """A name that is no word of C."""
-        return f"{name}_" if name in KEYWORDS else name
+        return f"{name}_" if name in KEYWORDS or OWN.fullmatch(name) else name
 
     @staticmethod
     def index(at: int) -> Constant:
@@ -201,9 +214,8 @@ class CWriter:
 
     def _binary(self, one: Binary) -> tuple[str, int]:
         if one.operator in ("//", "%"):
-            helper = (
-                "fmod" if one.type in ("real", "double") else "mod" if one.operator == "%" else "floordiv"
-            )
+            helper = "mod" if one.operator == "%" else "floordiv"
+            helper = f"f{helper}" if one.type in ("real", "double") else helper
             return self._apply(helper, (one.left, one.right), one.type), ATOM
         strength = PRECEDENCE[one.operator]
         # what stands to the left is done first; brackets where C compilers ask for them
@@ -328,7 +340,8 @@ class CWriter:
         if len(function.returns) > 1:
             head += [f"{self.types[kind]} *result_{place}" for place, kind in enumerate(function.returns)]
         result = self.types[function.returns[0]] if len(function.returns) == 1 else "void"
-        comment = f"/* {function.comment}. */\n" if function.comment else ""
+        said = function.comment.replace("*/", "* /")
+        comment = f"/* {said}. */\n" if said else ""
         opening = (
             f"{comment}static {result} {self.function_name(function)}({', '.join(head) or 'void'})\n{{\n"
         )

@@ -7,17 +7,18 @@ import builtins
 import inspect
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 import numpy as np
 
 from softstart.controller.compiled import keep_state
-from softstart.errors import InputError
-from softstart.export.source import REMEDIES, leaves, parsed, python_function
+from softstart.export.scope import ScopeReader
+from softstart.export.source import leaves, python_function
 from softstart.export.statements import (
     Apply,
     Array,
     Assign,
+    Binary,
     Call,
     Constant,
     Copy,
@@ -25,15 +26,13 @@ from softstart.export.statements import (
     Expression,
     Field,
     For,
-    Function,
     If,
-    Kind,
     Place,
     Statement,
     Struct,
     Unary,
     Variable,
-    walk,
+    changing,
 )  # fmt: skip
 from softstart.export.values import (
     OPERATORS,
@@ -42,7 +41,6 @@ from softstart.export.values import (
     Known,
     NoRows,
     Row,
-    Structs,
     Tuple,
     Value,
     applied,
@@ -68,88 +66,17 @@ MATH = {
 }  # fmt: skip
 
 
+MOST_PRODUCTS = 0x10000  # exponent up to which numba multiplies
+IN_ORDER = (inspect.Parameter.POSITIONAL_OR_KEYWORD,)  # what a parameter has to be
 MOVES = {python_function(one) for one in (keep_state, take_state, clear)}
 
 
-class Translations(Protocol):
-    """What translates the functions that an expression calls."""
-
-    structs: Structs
-    tables: dict[str, tuple[Array, tuple[float, ...]]]  # constant arrays
-    taken: dict[Function, list[bool]]  # of the arguments of a function, which ones are handed on
-
-    def function(
-        self, function: Callable[..., Any], arguments: Sequence[Value], fail: Any = None
-    ) -> Function:
-        """The statements of a function for arguments of these types."""
-
-    def masked(self, function: Callable[..., Any]) -> set[str]:
-        """The names of parameters whose bits are read."""
+def _above_0(value: Expression) -> bool:
+    return isinstance(value, Constant) and value.value > 0
 
 
-class ExpressionReader:
-    """Reads the expressions of one function.
-
-    `env` has what names stand for that are no variables, `kinds` the kinds of the variables; statements that
-    an expression needs before it are appended to `out`.
-    """
-
-    env: dict[str, Value]
-    out: list[Statement]
-    changed: set[str]
-    temporaries: int
-    places: dict[str, str]  # variables in the place of such parameters
-
-    def __init__(
-        self, translator: Translations, function: Callable[..., Any], arguments: Sequence[Value]
-    ) -> None:
-        self.translator, self.function = translator, function
-        self.tree = parsed(function)
-        self.first, self.file = function.__code__.co_firstlineno, function.__code__.co_filename
-        self.arguments = arguments
-        self.kinds: dict[str, Kind] = {}
-        self.widened: dict[str, Kind] = {}  # parameters that become another kind of number
-        self.returns: tuple[Kind, ...] | None = None
-        self.assigned = {
-            node.id
-            for node in ast.walk(self.tree)
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-        }
-
-    def fail(self, node: ast.AST, reason: str, remedy: str) -> NoReturn:
-        """Refuse what cannot be translated."""
-        line = self.first + getattr(node, "lineno", 1) - 1
-        text = ast.unparse(node).splitlines()[0]
-        raise InputError(f"{self.file}:{line}: {text}: {reason} cannot be exported; {remedy}.")
-
-    def variable(self, name: str) -> Variable:
-        """A variable that holds a number."""
-        return Variable(name, self.kinds[name])
-
-    def temporary(self, kind: Kind) -> Variable:
-        """A variable of its own."""
-        self.temporaries += 1
-        name = f"{TEMPORARY}{self.temporaries}"
-        self.kinds[name] = joined(kind, self.kinds.get(name, kind))
-        return Variable(name, self.kinds[name])
-
-    def _note_change(self, place: Expression) -> None:
-        while isinstance(place, Field | Element):
-            place = place.base
-        assert isinstance(place, Variable)
-        self.changed.add(place.name)
-
-    def saved(self, value: Value) -> Expression:
-        """A number in a variable of its own."""
-        assert isinstance(value, Expression)
-        variable = self.temporary(kind_of(value))
-        self.out.append(Assign(variable, converted(value, kind_of(variable))))
-        return variable
-
-    def _refuse(self, node: ast.AST) -> NoReturn:
-        name = type(node).__name__.lower()
-        reason, remedy = REMEDIES.get(type(node), (f"`{name}`", "write it with if, for, while and numbers"))
-        self.fail(node, reason, remedy)
+class ExpressionReader(ScopeReader):
+    """Reads the expressions of one function."""
 
     # expressions --------------------------------------------------------------------------------------
 
@@ -159,10 +86,14 @@ class ExpressionReader:
         for node in nodes:
             mark = len(self.out)
             value = self.value(node)
-            if any(isinstance(one, Call) and one.function.changed for one in walk(tuple(self.out[mark:]))):
+            if changing(self.out[mark:]):
                 later, self.out = self.out[mark:], self.out[:mark]
                 values = [
-                    self.saved(one) if is_number(one) and not isinstance(one, Constant) else one
+                    one
+                    if isinstance(one, Constant)
+                    else self.saved(one)
+                    if is_number(one)
+                    else self.frozen(one)
                     for one in values
                 ]
                 self.out += later
@@ -187,10 +118,24 @@ class ExpressionReader:
 
     def condition(self, node: ast.expr) -> Expression:
         """An expression as a truth."""
+        if isinstance(node, ast.BoolOp):
+            return self._bool_op(node, self.condition)
         return truth(self._number(node, self.value(node)))
+
+    def _truth(self, node: ast.expr) -> Expression:
+        one = self._number(node, self.value(node))
+        if one.type != "truth":
+            self.fail(node, "one of two numbers by `and` or `or`", "compare it, as with `!= 0`")
+        return one
 
     def value(self, node: ast.expr) -> Value:
         """The value of an expression; calls and conditional parts become statements before it."""
+        found = self._value(node)
+        if isinstance(found, Constant) and found.type == "whole" and not -(2**63) <= found.value < 2**63:
+            self.fail(node, "a whole number beyond 64 bits", "write it with a point")
+        return found
+
+    def _value(self, node: ast.expr) -> Value:
         match node:
             case ast.Constant():
                 constant = number(node.value)
@@ -208,7 +153,7 @@ class ExpressionReader:
             case ast.UnaryOp():
                 return self._unary(node)
             case ast.BoolOp():
-                return self._bool_op(node)
+                return self._bool_op(node, self._truth)
             case ast.Compare():
                 return self._compare(node)
             case ast.IfExp():
@@ -227,7 +172,7 @@ class ExpressionReader:
         if name in self.assigned:
             self.fail(node, "a name that may stand for different things", "use one name for each")
         closure = inspect.getclosurevars(self.function).nonlocals
-        for names in (self.function.__globals__, closure, vars(builtins)):
+        for names in (closure, self.function.__globals__, vars(builtins)):
             if name in names:
                 return self._known(names[name], name)
         self.fail(node, "an unknown name", "define it before")
@@ -237,8 +182,12 @@ class ExpressionReader:
         if constant is not None:
             return constant
         if isinstance(thing, np.ndarray) and thing.dtype == np.float64 and thing.ndim == 1:
-            kind = Array("real", thing.shape)
-            self.translator.tables[name] = kind, tuple(thing.tolist())
+            kind, tables = Array("real", thing.shape), self.translator.tables
+            table = kind, tuple(thing.tolist())
+            own = self.words & (self.assigned | set(inspect.signature(self.function).parameters))
+            while name in own or (name in tables and repr(tables[name]) != repr(table)):
+                name += "_2"
+            tables[name] = table
             return Variable(name, kind)
         if isinstance(thing, tuple) and all(number(one) is not None for one in thing):
             return Tuple(tuple(self._known(one, name) for one in thing))
@@ -295,7 +244,9 @@ class ExpressionReader:
             return self._slice(node, node.slice)
         nodes = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         base, *values = self.read_all([node.value, *nodes])
-        indices = tuple(self._whole(one, value) for one, value in zip(nodes, values, strict=True))
+        indices: tuple[Expression, ...] = tuple(
+            self._whole(one, value) for one, value in zip(nodes, values, strict=True)
+        )
         if isinstance(base, Row) and base.head is None and base.tail is not None:
             base = base.tail
         if isinstance(base, Tuple):
@@ -306,12 +257,34 @@ class ExpressionReader:
             and len(indices) <= len(base.type.shape)
         ):
             left = base.type.shape[len(indices) :]
+            pairs = list(zip(indices, base.type.shape, strict=False))
+            if any(isinstance(one, Constant) and not -size <= one.value < size for one, size in pairs):
+                self.fail(node, "an index beyond the last element", "use one that there is")
+            indices = tuple(
+                Constant(one.value % size, "whole") if isinstance(one, Constant) else one
+                for one, size in pairs
+            )
             return Element(base, indices, Array(base.type.element, left) if left else base.type.element)
         self.fail(node, "this index", "give rows of numbers names with `as_record`")
 
+    def _from_the_end(self, index: Expression, size: int) -> Expression:
+        """An index of 0 and more; those below count from the end."""
+        counts = isinstance(index, Variable) and index.name in self.counting
+        if counts or (isinstance(index, Binary) and index.operator == "%" and _above_0(index.right)):
+            return index
+        found = self.temporary("whole")
+        self.out.append(Assign(found, index))
+        below = operation("<", found, Constant(0, "whole"))
+        self.out.append(If(below, (Assign(found, operation("+", found, Constant(size, "whole"))),)))
+        return found
+
     def _item(self, node: ast.Subscript, base: Tuple, index: Expression) -> Value:
+        size = len(base.items)
         if isinstance(index, Constant):
+            if not -size <= index.value < size:
+                self.fail(node, "an index beyond the last value", "use one that there is")
             return base.items[int(index.value)]
+        index = self._from_the_end(index, size)
         numbers = [self._number(node, item) for item in base.items]
         index = index if is_simple(index) else self.saved(index)
         chosen = self.temporary(joined(*(kind_of(one) for one in numbers)))
@@ -337,20 +310,31 @@ class ExpressionReader:
         self, node: ast.AST, operator: ast.operator, left: Expression, right: Expression
     ) -> Expression:
         if isinstance(operator, ast.Pow):
-            if isinstance(right, Constant) and right.value in (1, 2, 3, 4):
-                base = converted(left, joined("real", kind_of(left))) if right.type == "real" else left
-                return power(base if is_simple(base) else self.saved(base), int(right.value))
-            return applied("pow", [left, right])
+            return self._power(node, left, right)
         if isinstance(operator, ast.BitAnd) and isinstance(left, Constant) and isinstance(right, Constant):
             return Constant(int(left.value) & int(right.value), "whole")
         if type(operator) not in OPERATORS:
             self.fail(node, f"the operator {type(operator).__name__}", "use + - * / // % **, and, or, not")
         return operation(OPERATORS[type(operator)], left, right)
 
+    def _power(self, node: ast.AST, left: Expression, right: Expression) -> Expression:
+        """Products where numba takes them: for whole exponents that are known, and the square."""
+        whole = joined(kind_of(left), kind_of(right)) in ("truth", "whole")
+        known = right.value if isinstance(right, Constant) and right.type == "whole" else 0
+        if 0 < known <= MOST_PRODUCTS or (-MOST_PRODUCTS <= known < 0 and not whole):
+            result = power(left if is_simple(left) else self.saved(left), abs(int(known)))
+            return result if known > 0 else operation("/", Constant(1.0, "real"), result)
+        if isinstance(right, Constant) and right.value in (1, 2) and not whole:
+            base = converted(left, joined("real", kind_of(left)))
+            return power(base if is_simple(base) else self.saved(base), int(right.value))
+        if whole:
+            self.fail(node, "this power of a whole number", "make the base a float")
+        return applied("pow", [left, right])
+
     def _unary(self, node: ast.UnaryOp) -> Expression:
-        operand = self._number(node.operand, self.value(node.operand))
         if isinstance(node.op, ast.Not):
-            return negated(truth(operand))
+            return negated(self.condition(node.operand))
+        operand = self._number(node.operand, self.value(node.operand))
         if isinstance(node.op, ast.USub):
             operand = converted(operand, joined("whole", kind_of(operand)))
             return (
@@ -362,14 +346,14 @@ class ExpressionReader:
             self.fail(node, "this operator", "use - or not") if isinstance(node.op, ast.Invert) else operand
         )
 
-    def _bool_op(self, node: ast.BoolOp) -> Expression:
+    def _bool_op(self, node: ast.BoolOp, read: Callable[[ast.expr], Expression]) -> Expression:
         operator = "and" if isinstance(node.op, ast.And) else "or"
-        result = self.condition(node.values[0])
+        result = read(node.values[0])
         for one in node.values[1:]:
             if isinstance(result, Constant) and bool(result.value) == (operator == "or"):
                 return result
             outer, self.out = self.out, []
-            right = self.condition(one)
+            right = read(one)
             before, self.out = self.out, outer
             if not before:
                 result = both(operator, result, right)
@@ -392,7 +376,10 @@ class ExpressionReader:
             for other in others:
                 found = both("or", found, operation("==", left, other))
             return negated(found) if isinstance(node.ops[0], ast.NotIn) else found
+        mark = len(self.out)
         numbers = self.read_numbers([node.left, *node.comparators])
+        if len(node.ops) > 1 and changing(self.out[mark:]):  # Python may not come to the last one
+            self.fail(node, "a call that changes a record in such a chain", "compare two by two, with `and`")
         result: Expression = Constant(True, "truth")
         for left, operator, right in zip(numbers, node.ops, numbers[1:], strict=False):
             if type(operator) not in OPERATORS:
@@ -484,6 +471,8 @@ class ExpressionReader:
                 return converted(numbers[0], joined("real", kind_of(numbers[0])))
             case "bool":
                 return truth(numbers[0])
+            case "floor" | "ceil" if module != "math":  # NumPy keeps the kind
+                return applied(name, numbers)
             case "floor" | "ceil":
                 one = numbers[0]
                 return one if one.type == "whole" else converted(applied(name, [one]), "whole")
@@ -517,7 +506,7 @@ class ExpressionReader:
         state, command = (structs[-1], structs[0]) if name != "keep_state" else (structs[0], structs[1])
         assert isinstance(state.type, Struct)
         target = command if name == "keep_state" else state
-        self._note_change(target)
+        self._note_change(node, target)
         for member in state.type.members:
             place = Field(target, member.name, member.type)
             source = Field(state if name == "keep_state" else command, member.name, member.type)
@@ -550,6 +539,14 @@ class ExpressionReader:
         def fail(sentence: str) -> NoReturn:
             self.fail(node, sentence, "write a loop")
 
+        wanted = list(inspect.signature(function).parameters.values())
+        arguments = arguments + [
+            self._known(one.default, one.name)
+            for one in wanted[len(arguments) :]
+            if one.default is not inspect.Parameter.empty
+        ]
+        if len(arguments) != len(wanted) or any(one.kind not in IN_ORDER for one in wanted):
+            self.fail(node, "another number of arguments", "hand on each of them, in order")
         made = self.translator.function(function, arguments, fail)
         pieces = [leaf for argument in arguments for leaf in leaves(argument)]
         taken = self.translator.taken[made]
@@ -559,7 +556,7 @@ class ExpressionReader:
             one for one, parameter in zip(handed, parameters, strict=True) if parameter.name in made.changed
         ]
         for one in changes:
-            self._note_change(one)
+            self._note_change(node, one)
         values = tuple(
             converted(one, parameter.type) if isinstance(parameter.type, str) else one
             for one, parameter in zip(handed, parameters, strict=True)

@@ -49,8 +49,13 @@ def parsed(function: Callable[..., Any]) -> ast.FunctionDef:
     except OSError:
         sentence = f"{function.__name__}: its source is not to be found; write it in a file to export it."
         raise InputError(sentence) from None
-    tree = ast.parse(textwrap.dedent(lines)).body[0]
-    assert isinstance(tree, ast.FunctionDef)
+    try:
+        tree = ast.parse(textwrap.dedent(lines)).body[0]
+    except SyntaxError:  # a part of a line
+        tree = ast.Pass()
+    if not isinstance(tree, ast.FunctionDef):
+        sentence = f"{function.__code__.co_filename}:{function.__code__.co_firstlineno}: {function.__name__}"
+        raise InputError(f"{sentence}: this cannot be exported; write a function with `def`.")
     return tree
 
 

@@ -8,7 +8,7 @@ Structures and arrays are handed on by reference, numbers by value. Expressions 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from typing import Literal
 
@@ -270,6 +270,28 @@ def expressions(statement: Statement) -> tuple[Expression, ...]:
             return *arguments, *(place for place in places if place is not None)
         case _:
             return ()
+
+
+def changing(statements: Iterable[Statement]) -> bool:
+    """Whether a function is called that changes what it is handed."""
+    return any(isinstance(one, Call) and bool(one.function.changed) for one in walk(tuple(statements)))
+
+
+def ends(body: tuple[Statement, ...]) -> bool:
+    """Whether the function always ends in these statements."""
+    return any(
+        isinstance(one, Return)
+        or (isinstance(one, If) and ends(one.body) and ends(one.otherwise))
+        or (isinstance(one, While) and isinstance(one.condition, Constant) and not _left(one.body))
+        for one in body
+    )
+
+
+def _left(body: tuple[Statement, ...]) -> bool:
+    return any(
+        one == Leave("break") or (isinstance(one, If) and (_left(one.body) or _left(one.otherwise)))
+        for one in body
+    )
 
 
 def walk(statements: tuple[Statement, ...]) -> Iterator[Statement]:

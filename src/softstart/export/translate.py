@@ -12,7 +12,6 @@ from __future__ import annotations
 import ast
 import inspect
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from typing import Any, NoReturn
 
 from softstart.errors import InputError
@@ -38,6 +37,8 @@ from softstart.export.statements import (
     Struct,
     Variable,
     While,
+    changing,
+    ends,
     expressions,
     parts,
     walk,
@@ -125,7 +126,7 @@ class Translator:
         functions: list[Function] = []
         structs: dict[str, Struct] = {}
         _collect(entry, functions)
-        taken: set[str] = set()
+        taken = {name.lower() for name in self.tables}
         for function in functions:
             base, count = function.name, 2
             while function.name.lower() in taken:
@@ -183,6 +184,15 @@ class Reader(ExpressionReader):
 
     def read(self) -> Function:
         """Read until the kinds of all variables stay, then say what they are."""
+        self._check_loop_variables()
+        given_by_name = self.tree.args
+        if (
+            given_by_name.posonlyargs
+            or given_by_name.kwonlyargs
+            or given_by_name.vararg
+            or given_by_name.kwarg
+        ):
+            self.fail(self.tree, "a function with such parameters", "write them without `*` and `/`")
         for _ in range(MOST_PASSES):
             before = dict(self.kinds), self.returns
             self._pass()
@@ -192,6 +202,8 @@ class Reader(ExpressionReader):
             self.fail(
                 self.tree, "a function whose kinds of numbers do not settle", "give variables new names"
             )
+        if self.returns and not ends(tuple(self.out)):
+            self.fail(self.tree, "a function that may end without a value", "return one at its end")
         given = {parameter.name for parameter in self.parameters}
         doc = (ast.get_docstring(self.tree) or "").split("\n")[0].rstrip(".")
         made = Function(
@@ -206,12 +218,15 @@ class Reader(ExpressionReader):
             if isinstance(part, Variable)
         }
         made.locals = {name: kind for name, kind in self.kinds.items() if name in used and name not in given}
-        self._check_loop_variables()
         return made
 
     def _pass(self) -> None:
         self.env: dict[str, Value] = {}
-        self.kinds = {name: kind for name, kind in self.kinds.items() if not name.startswith(TEMPORARY)}
+        self.kinds = {
+            name: kind
+            for name, kind in self.kinds.items()
+            if name in self.words or not name.startswith(TEMPORARY)
+        }
         self.places = {}
         self.parameters: list[Variable] = []
         self.taken: list[bool] = []
@@ -226,10 +241,10 @@ class Reader(ExpressionReader):
 
     def _bind_parameter(self, name: str, argument: Value) -> None:
         if isinstance(argument, Tuple):
-            names = [f"{name}_{place}" for place in range(len(argument.items))]
+            names = [self.fresh(f"{name}_{place}") for place in range(len(argument.items))]
             for one, item in zip(names, argument.items, strict=True):
                 self._bind_parameter(one, item)
-            self.env[name] = Tuple(tuple(self.variable(one) for one in names))
+            self.env[name] = Tuple(tuple(self.env.get(one) or self.variable(one) for one in names))
         elif isinstance(argument, Row):
             pieces = [
                 None if piece is None else self._parameter(f"{name}{ending}", piece.type)
@@ -246,9 +261,9 @@ class Reader(ExpressionReader):
         else:
             variable = self._parameter(name, argument.type)
             if name in self.widened:
-                self.places[name] = f"{name}_changed"
-                place = Variable(self.places[name], self.widened[name])
-                self.out.append(Assign(place, converted(variable, self.widened[name])))
+                changed = self.places[name] = self.fresh(f"{name}_changed")
+                kind = joined(self.widened[name], self.kinds.get(changed, self.widened[name]))
+                self.out.append(Assign(Variable(changed, kind), converted(variable, kind)))
             if isinstance(argument.type, str):
                 self.kinds[name] = argument.type
             else:
@@ -267,10 +282,12 @@ class Reader(ExpressionReader):
         inside = {
             id(node)
             for loop in loops
-            for node in ast.walk(loop)
+            for inner in loop.body
+            for node in ast.walk(inner)
             if isinstance(node, ast.Name) and isinstance(loop.target, ast.Name) and node.id == loop.target.id
         }
-        targets = {id(loop.target) for loop in loops}
+        targets = {id(loop.target) for loop in loops} - inside
+        inside |= targets
         for node in ast.walk(self.tree):
             if isinstance(node, ast.Name) and node.id in names and node.id != "_":
                 stored = isinstance(node.ctx, ast.Store) and id(node) not in targets
@@ -297,7 +314,14 @@ class Reader(ExpressionReader):
             case ast.AugAssign():
                 place = ast.parse(ast.unparse(node.target), mode="eval").body
                 ast.copy_location(place, node)
+                mark = len(self.out)
                 left, right = self.read_numbers([place, node.value])
+                if changing(self.out[mark:]) and any(
+                    isinstance(one, ast.Subscript) for one in ast.walk(place)
+                ):
+                    self.fail(
+                        node, "an index beside a call that changes a record", "call it on a line before"
+                    )
                 self.store(node.target, self._operation(node, node.op, left, right))
             case ast.AnnAssign(value=value) if value is not None:
                 self.store(node.target, self.value(value))
@@ -325,6 +349,7 @@ class Reader(ExpressionReader):
         if len(node.targets) > 1 and is_number(value) and not isinstance(value, Constant):
             assert isinstance(value, Expression)
             value = self.saved(value)
+        value = self.frozen(value) if len(node.targets) > 1 else value
         for target in node.targets:
             self.store(target, value)
 
@@ -333,6 +358,9 @@ class Reader(ExpressionReader):
         if isinstance(target, ast.Tuple):
             if not isinstance(value, Tuple) or len(value.items) != len(target.elts):
                 self.fail(target, "what is not so many values", "write the values one by one")
+            for one, item in zip(target.elts, value.items, strict=True):
+                if isinstance(one, ast.Attribute | ast.Subscript) and not is_number(item):
+                    self.fail(target, "a copy of several records", "copy one by one")
             # all values are taken before the first is stored
             items = [self.saved(item) if self._at_risk(item, target) else item for item in value.items]
             for one, item in zip(target.elts, items, strict=True):
@@ -340,10 +368,13 @@ class Reader(ExpressionReader):
         elif isinstance(target, ast.Name):
             self._store_name(target, value)
         elif isinstance(target, ast.Attribute | ast.Subscript):
+            mark = len(self.out)
             place = self.value(target)
+            if changing(self.out[mark:]):
+                self.fail(target, "a call that changes a record in a place", "call it on a line before")
             if not isinstance(place, Field | Element) or not isinstance(value, Expression):
                 self.fail(target, "this place", "assign numbers to fields of records")
-            self._note_change(place)
+            self._note_change(target, place)
             if isinstance(place.type, str):
                 self.out.append(Assign(place, converted(self._number(target, value), place.type)))
             else:
@@ -359,6 +390,7 @@ class Reader(ExpressionReader):
         fields: set[str] = set()
         for node in ast.walk(target):
             if isinstance(node, ast.Name):
+                names |= {self.places.get(node.id, node.id)} if isinstance(node.ctx, ast.Store) else set()
                 (names if isinstance(node.ctx, ast.Store) else fields).add(node.id)
             elif isinstance(node, ast.Attribute):
                 fields.add(node.attr)
@@ -380,7 +412,7 @@ class Reader(ExpressionReader):
         ):
             self.fail(target, "another value for a parameter that is a record", "give it a new name")
         if not is_number(value):
-            self.env[name] = self._frozen(value)
+            self.env[name] = self.frozen(value)
             return
         assert isinstance(value, Expression)
         self.env.pop(name, None)
@@ -388,40 +420,10 @@ class Reader(ExpressionReader):
         given = {parameter.name: parameter.type for parameter in self.parameters}
         if given.get(name, kind) != kind:  # of a parameter: a variable takes its place in the next pass
             self.widened[name] = joined(kind, self.widened.get(name, kind))
-            self.kinds[f"{name}_changed"] = self.widened[name]
+            self.kinds[self.fresh(f"{name}_changed")] = self.widened[name]
             return
         self.kinds[name] = kind
         self.out.append(Assign(Variable(name, kind), converted(value, kind)))
-
-    def _frozen(self, value: Value) -> Value:
-        """Another name for a part of a record: indices and numbers of a tuple stay what they are now."""
-        match value:
-            case Element(base, indices):
-                kept = tuple(
-                    index if isinstance(index, Constant) else self._kept_index(index) for index in indices
-                )
-                frozen = self._frozen(base)
-                assert isinstance(frozen, Expression)
-                return replace(value, base=frozen, indices=kept)
-            case Field(base):
-                frozen = self._frozen(base)
-                assert isinstance(frozen, Expression)
-                return replace(value, base=frozen)
-            case Tuple(items):
-                return Tuple(
-                    tuple(
-                        self.saved(item)
-                        if isinstance(item, Expression) and is_number(item) and not isinstance(item, Constant)
-                        else self._frozen(item)
-                        for item in items
-                    )
-                )
-            case _:
-                return value
-
-    def _kept_index(self, index: Expression) -> Expression:
-        fixed = isinstance(index, Variable) and index.name not in self.assigned
-        return index if fixed else self.saved(index)
 
     def _if(self, node: ast.If) -> None:
         condition = self.condition(node.test)
@@ -447,7 +449,14 @@ class Reader(ExpressionReader):
         if not isinstance(node.target, ast.Name) or node.orelse:
             self.fail(node, "this loop", "write `for name in range(...)`, without `else`")
         if isinstance(node.iter, ast.Tuple):
-            items = self.read_all(node.iter.elts)
+            items = [
+                one
+                if isinstance(one, Expression) and self.stays(one)
+                else self.saved(one)
+                if is_number(one)
+                else self.frozen(one)
+                for one in self.read_all(node.iter.elts)
+            ]
             if any(isinstance(one, ast.Break | ast.Continue) for one in ast.walk(node)):
                 self.fail(node, "break or continue in a loop over a tuple", "write a loop over `range`")
             self._loop_begins(node)
@@ -468,19 +477,18 @@ class Reader(ExpressionReader):
         if not isinstance(step, Constant) or step.value == 0:
             self.fail(call, "a range whose step is no constant other than 0", "write the step as a number")
         self._loop_begins(node)
-        name = f"count_{node.lineno}" if node.target.id == "_" else node.target.id
+        name = self.fresh(f"count_{node.lineno}") if node.target.id == "_" else node.target.id
         if self.kinds.setdefault(name, "whole") != "whole":
             self.fail(node.target, "a loop variable that is a number elsewhere", "give it a new name")
         start, stop = self._fixed(start), self._fixed(stop)
+        upwards = step.value > 0 and isinstance(start, Constant) and start.value >= 0
+        self.counting = self.counting | {name} if upwards else self.counting - {name}
         body = self.block(node.body)
         self.out.append(For(Variable(name, "whole"), start, stop, int(step.value), body))
 
     def _fixed(self, bound: Expression) -> Expression:
         """A bound of a loop, which is read once."""
-        if isinstance(bound, Constant):
-            return bound
-        fixed = isinstance(bound, Variable) and bound.name not in self.assigned
-        return bound if fixed else self.saved(bound)
+        return bound if self.stays(bound) else self.saved(bound)
 
     def _while(self, node: ast.While) -> None:
         if node.orelse:
@@ -489,6 +497,8 @@ class Reader(ExpressionReader):
         outer, self.out = self.out, []
         condition = self.condition(node.test)
         before, self.out = self.out, outer
+        if isinstance(condition, Constant) and not condition.value:
+            return
         body = self.block(node.body)
         if before:
             leave = If(negated(condition), (Leave("break"),))

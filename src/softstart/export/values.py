@@ -159,7 +159,11 @@ def operation(operator: str, left: Expression, right: Expression) -> Expression:
         kind = "whole"
     left, right = converted(left, kind), converted(right, kind)
     result: Kind = "truth" if compares else kind
-    if isinstance(left, Constant) and isinstance(right, Constant) and (operator != "/" or right.value != 0):
+    if (
+        isinstance(left, Constant)
+        and isinstance(right, Constant)
+        and (operator not in ("/", "//", "%") or right.value != 0)
+    ):
         folded = number(_FOLDED[operator](left.value, right.value))
         assert folded is not None
         return Constant(folded.value, result)

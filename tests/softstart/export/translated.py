@@ -205,3 +205,66 @@ def widened(n: int, x: float) -> float:
     n = n + x
     n += 1
     return n + before
+
+
+def quotients(x: float, y: float) -> float:
+    y = y + 4.5  # not 0
+    signs = math.copysign(1.0, x % y) + math.copysign(4.0, (2.0 * y) % -y) + 16.0 * math.copysign(1.0, x // y)
+    return signs + x % -y + 3.0 * (x // -y)
+
+
+def whole_quotients(n: int, k: int) -> int:
+    k = k + 3
+    return n // k + 5 * (n % k) + (n // (k * k + 1)) % -3
+
+
+def more_powers(x: float) -> float:
+    return (x + 9.0) ** 5 + (x + 9.0) ** -2 + (x + 9.0) ** 2.0 + (x + 9.0) ** -1
+
+
+def same_names(x: float, y: float, n: int) -> float:  # as those that the export makes
+    value_1 = x if x > y else y
+    count_5, x_changed, result_0, unused_real = 1.0, 2.0, 3.0, 4.0
+    for _ in range(3):
+        value_2 = y if n > 2 else x
+        count_5 += value_1 * 0.5 + value_2
+    n = n + x_changed
+    n_changed = 5.0
+    return value_1 + count_5 + x_changed + result_0 + unused_real + n + n_changed
+
+
+@compiled
+def pieces(pair: tuple[float, float], pair_0: float, scale: float = 2.0) -> float:
+    """Names of parts that are names too, and a default."""
+    pair_1 = pair_0 + 1.0
+    pair = (pair[1], pair[0])
+    return pair[0] * scale + 10.0 * pair[1] + 100.0 * pair_0 + 1000.0 * pair_1
+
+
+def handed_on(x: float, y: float) -> float:
+    return pieces((x, y), 3.0) + pieces((y, x), 1.0, 0.5)
+
+
+def orders(o: Any, x: float, n: int) -> float:
+    n, y = n + 0.5, n
+    a, b = c, d = x, y
+    x, y = a, b = y, x
+    total = 0.0
+    for share in (x, y, o.x):
+        total += share
+        y = 100.0
+        o.x = 50.0
+    while COUNT < 0:
+        total += 1.0
+    return total + a * 2.0 + b * 3.0 + c * 5.0 + d * 7.0 + n
+
+
+def from_the_end(o: Any, n: int) -> float:
+    ring, m = o.inner.ring, n % 4 - 3
+    ring[-1] += 1.0
+    return ring[-4] + 10.0 * ring[-1] + PAIR[-1] + (1.0, 5.0, 7.0)[m if m > -3 else 0] + o.grid[-1, -2]
+
+
+def widest(x: float, n: int) -> float:
+    flags = x > 0.0 or n > 2
+    return (1.0 if not (n or x) else 2.0) + (4.0 if flags and n else 8.0)
