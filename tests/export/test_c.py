@@ -241,5 +241,5 @@ def test_the_exported_test_runs_under_sanitizers(name: str, tmp_path: Path) -> N
             "gcc", *tools.STRICT, "-O1", *flags, "-o", "check", f"test_{prefix}.c", f"{prefix}.c", "-lm",
             cwd=folder,
         )  # fmt: skip
-        said = tools.run("./check", "vectors.csv", cwd=folder)
+        said = tools.run(folder / "check", "vectors.csv", cwd=folder)
         assert " 0 differ" in said, said
