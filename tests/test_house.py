@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 42700, "tests": 29700}
+MOST = {"src, controllers": 42707, "tests": 29535}
 LONGEST_FILE = 560  # statements
 LONGEST_FUNCTION = 70  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef

@@ -261,9 +261,10 @@ class ExpressionReader(ScopeReader):
             if any(isinstance(one, Constant) and not -size <= one.value < size for one, size in pairs):
                 self.fail(node, "an index beyond the last element", "use one that there is")
             indices = tuple(
-                Constant(one.value % size, "whole") if isinstance(one, Constant) else one
+                Constant(one.value % size, "whole") if isinstance(one, Constant)
+                else one if self.translator.in_bounds else self._from_the_end(one, size)
                 for one, size in pairs
-            )
+            )  # fmt: skip
             return Element(base, indices, Array(base.type.element, left) if left else base.type.element)
         self.fail(node, "this index", "give rows of numbers names with `as_record`")
 

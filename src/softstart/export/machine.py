@@ -58,7 +58,7 @@ def machine_c(machine: Machine, prefix: str) -> dict[str, str]:
 
 def _program(given: KernelInput) -> Program:
     """The kernel for so many masses; of its work only what it uses."""
-    translator = Translator({rec.MOST_MASSES: max(given.count, 2)})
+    translator = Translator({rec.MOST_MASSES: max(given.count, 2)}, in_bounds=True)
     structs = translator.structs
 
     def row(name: str, dtype: Any) -> Row:

@@ -39,6 +39,7 @@ class Translations(Protocol):
     """What translates the functions that an expression calls."""
 
     structs: Structs
+    in_bounds: bool  # all indices are 0 or more, known beforehand; else those below count from the end
     tables: dict[str, tuple[Array, tuple[float, ...]]]  # constant arrays
     taken: dict[Function, list[bool]]  # of the arguments of a function, which ones are handed on
 

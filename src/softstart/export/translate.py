@@ -68,9 +68,11 @@ class Translator:
     Parameters
     ----------
     sizes : sizes of arrays in records that the export shrinks, old: new.
+    in_bounds : all indices are 0 or more, known beforehand; else those below count from the end.
     """
 
-    def __init__(self, sizes: dict[int, int] | None = None) -> None:
+    def __init__(self, sizes: dict[int, int] | None = None, in_bounds: bool = False) -> None:
+        self.in_bounds = in_bounds
         self.structs = Structs(sizes)
         self.tables: dict[str, tuple[Array, tuple[float, ...]]] = {}
         self.taken: dict[Function, list[bool]] = {}  # of the arguments, which ones are handed on

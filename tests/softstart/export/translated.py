@@ -268,3 +268,11 @@ def from_the_end(o: Any, n: int) -> float:
 def widest(x: float, n: int) -> float:
     flags = x > 0.0 or n > 2
     return (1.0 if not (n or x) else 2.0) + (4.0 if flags and n else 8.0)
+
+
+def arrays_from_the_end(o: Any, n: int, x: float) -> float:
+    ring = o.inner.ring
+    ring[n % 4 - 2] += x
+    k = n % 4 - 4
+    o.grid[k // 2, n % 3 - 1] = x
+    return ring[k] + o.grid[-1, n % 3 - 3] + ring[n % 4]
