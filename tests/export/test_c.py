@@ -15,6 +15,9 @@ import pytest
 from tests.export import tools
 from tests.softstart.export import translated
 from tests.softstart.export.test_translate import KINDS, NAMES, POWERS, Attributes, filled, function_of
+from tests.softstart.test_block_faults import KINDS as FAULT_KINDS
+from tests.softstart.test_block_faults import Case, follow
+from tests.softstart.test_guard import random_drive as fault_drive
 
 from softstart import Drive, TorqueProfile, simulate
 from softstart.controller import Controller, make_controller
@@ -228,6 +231,36 @@ def test_commands_of_a_thousand_drives(name: str) -> None:
     cycles = check_loops(name, range(100, 180))
     print(f"{name}: {cycles} cycles, 0 differ")
     assert cycles > 4000
+
+
+def check_fault(number: int) -> int:
+    """A fault on the exact plant: all cycles under the block in C are those under the block in Python."""
+    kind = FAULT_KINDS[number % len(FAULT_KINDS)]
+    name = STRATEGIES[(number // len(FAULT_KINDS)) % len(STRATEGIES)]
+    drive = next(iter(fault_drive(number).positions.values()))
+    design = design_for(controller_of(name), drive)
+    code = written(design, Vectors(("cycles",), ()), "c", "block", "float64")
+    outcomes = []
+    with CompiledBlock(design, code.c_sources, "block") as block:
+        for one in (design.block(), block):
+            rng = np.random.default_rng(5000 + number)
+            outcomes.append(follow(one, drive, Case(kind, float(rng.uniform(0.01, 0.3)), rng, drive)))
+    first, second = (outcome.cycles for outcome in outcomes)
+    assert first == second, (kind, name)
+    assert outcomes[0].compared == outcomes[1].compared
+    assert any(cycle.fault for cycle in first) or kind in ("restart", "stop", "stuck")
+    return len(first)
+
+
+@pytest.mark.parametrize("number", range(0, 9 * len(STRATEGIES), 5))
+def test_faults_meet_the_same_answer_in_c(number: int) -> None:
+    assert check_fault(number) > 10
+
+
+@pytest.mark.slow
+def test_500_faults_in_c() -> None:
+    cycles = sum(map(check_fault, range(500)))
+    print(f"500 faults, {cycles} cycles, 0 differ")
 
 
 @pytest.mark.parametrize("name", STRATEGIES)

@@ -100,13 +100,15 @@ class CompiledBlock:
 
     def begin(self) -> None:
         """The first state."""
-        self._last = math.nan
+        self._first, self._counted = math.nan, 0  # time of the first cycle, and cycles since then
         self._library.softstart_init(self._memory)
 
     def step(self, measured: Measured) -> BlockOutput:
         """One cycle."""
-        cycles = 1.0 if math.isnan(self._last) else round((measured.time - self._last) / self.period)
-        self._last = measured.time
+        if math.isnan(self._first):
+            self._first = measured.time
+        since = round((measured.time - self._first) / self.period)
+        cycles, self._counted = since - self._counted, since
         torque, fault = self.answer({**measured._asdict(), "cycles": cycles})
         return BlockOutput(torque, FAULTS[fault])
 

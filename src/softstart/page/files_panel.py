@@ -198,7 +198,7 @@ class ProgramPanel(JobPanel):
     name = "program"
     about = (
         "The selected strategy with its guard, tuned gains too, as a program for a PLC, an inverter or a "
-        "simulator; with instructions, and a test by real starts. It takes about ten seconds."
+        "simulator; with instructions, and a test by real starts. It takes a few seconds."
     )
     verb = "Program ZIP"
     saves = True
