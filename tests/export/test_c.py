@@ -147,7 +147,7 @@ def test_statements_mean_what_they_mean_in_python(name: str, library: ctypes.CDL
 
 @dataclass(frozen=True)
 class Both(PlainController):
-    """Two blocks in the place of the strategy; the answers of the first one act. For one run."""
+    """Two blocks run as the strategy; the outputs of the first one act. For one run."""
 
     name: ClassVar[str] = "both"
     saturates: ClassVar[bool] = True

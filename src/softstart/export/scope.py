@@ -63,7 +63,7 @@ class ScopeReader:
     out: list[Statement]
     changed: set[str]
     temporaries: int
-    places: dict[str, str]  # variables in the place of such parameters
+    places: dict[str, str]  # variables that replace such parameters
 
     def __init__(
         self, translator: Translations, function: Callable[..., Any], arguments: Sequence[Value]

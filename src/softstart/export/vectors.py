@@ -111,7 +111,7 @@ class Scenario:
 
 @dataclass(frozen=True)
 class Recorded(PlainController):
-    """A block in the place of a controller that writes down what it measures and answers; for one run."""
+    """A block that runs as the controller and records its inputs and outputs; for one run."""
 
     name: ClassVar[str] = "block"
     saturates: ClassVar[bool] = True

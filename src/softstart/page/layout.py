@@ -25,7 +25,7 @@ from softstart.page.session import Session
 
 WEB = Path(__file__).with_name("web")
 EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
-DUTY = "Duty"  # this tab is live too: a strip of steps in the place of the plots
+DUTY = "Duty"  # this tab is live too: it shows a strip of steps instead of the plots
 LARGE = "Sheet"  # this tab is built when it is opened: others would feel it
 # further tabs: title, module and class
 PANELS = (
