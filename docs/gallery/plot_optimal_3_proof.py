@@ -25,8 +25,8 @@ print(f"{best.method}: P = {P:.4f} N m, K_dyn {best.k_dyn:.6f}")
 # %%
 # **Closed form and descent.** Pulse, coast, hold is optimal here. The descent from constant torque
 # (successive linear programs on the exact start) does not know this form and finds it.
-search = Descent(problem)
-found = search.down(TorqueProfile([0.0], [search.high]), search.latest)
+search = Descent(problem, best.end_time)
+found = search.down(TorqueProfile([0.0], [search.high]))
 assert found is not None
 found = search.refined(found)
 print(f"descent: K_dyn {found.peak / problem.base_torque:.6f}")
@@ -34,7 +34,7 @@ times = np.linspace(0.0, best.end_time + 0.5 * drive.elastic_period, 1500)
 state = best.run.at(times)
 with drawing():
     primal, axes = new_figure(size=(8.0, 3.6))
-    axes.plot(search.time, found.torques, color="0.6", label="motor torque of the descent")
+    axes.plot(found.profile.time, found.profile.torque, color="0.6", label="motor torque of the descent")
     axes.plot(times, state["u"], color="#0072B2", label="motor torque $u$")
     axes.plot(times, state["T"], color="#D55E00", label="shaft torque $T$")
     axes.axhline(P, color="k", linewidth=0.8, linestyle=":", label="$P$")

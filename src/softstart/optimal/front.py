@@ -18,11 +18,11 @@ from softstart.controller import ready_controller_names
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.input.files import write_whole
-from softstart.optimal.descent import BEND
-from softstart.optimal.optimize import shortest_start_time, solve, start_time_of_direct
+from softstart.optimal.optimize import solve, start_time_of_direct
+from softstart.optimal.path import Path as StartPath
 from softstart.optimal.problem import Problem, StartTime, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
-from softstart.optimal.torque_speed import Corners
+from softstart.optimal.torque_speed import Corners, refuse_weak_curve
 from softstart.parallel import Pool, checked_workers
 from softstart.profile import TorqueProfile
 from softstart.results import OneLine, Result
@@ -39,9 +39,6 @@ COMPARISON_TERMINAL: Terminal = (
 )
 SHORT, LONG, COUNT = 1.02, 1.6, 12
 CHUNKS = 2  # stretches of start times for each worker
-SEARCHED = 10  # of so many points one is searched from all first demands
-JUMP = 0.1  # per cent, of the gap between K_dyn and its bound: searched again
-BETTER = 1e-4  # of K_dyn: a better start is followed back to longer start times
 COLUMNS = (
     "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind", "gap_percent",
     "optimal_k_dyn", "ratio", "heat", "contacts", "method", "status",
@@ -248,9 +245,9 @@ def pareto(
 ) -> Front:
     """Find the least K_dyn for each of several bounds on the start time, with its lower bound.
 
-    The sweep goes from long start times to short ones, each optimum followed from its neighbour; every few
-    are searched as by `optimize`. No point is left above one of a shorter start time, as a start may arrive
-    early. Start times too short for any start are marked infeasible.
+    Each point is what `optimize` finds; the starts on the way are found once for all. No point is left above
+    one of a shorter start time, as a start may arrive early. Start times too short for any start are marked
+    infeasible.
 
     Parameters
     ----------
@@ -313,9 +310,12 @@ def pareto(
     count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
     target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
     runs = [simulate(drive, one, base=base) for one in made]
+    paths = {end: StartPath(Problem(drive, 1.0, end, **options)) for end in (terminal, COMPARISON_TERMINAL)}
     if times is None:
         tell("looking for the shortest start time")
-        times = default_start_times(drive, terminal, torque_speed=torque_speed, smoothness=smoothness)
+        times = default_start_times(
+            drive, terminal, torque_speed=torque_speed, smoothness=smoothness, path=paths[terminal]
+        )
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     found: dict[tuple[str, float], FrontPoint] = {}
     with (
@@ -329,7 +329,11 @@ def pareto(
             asked = {*(times if ending == terminal else ()), *(own if ending == COMPARISON_TERMINAL else ())}
             known = {t: FrontPoint.of_record(one) for t in asked if (one := saved.find(ending, t))}
             for point in _points(
-                TimeRange(drive, options, ending, tuple(sorted(asked, reverse=True))), known, pool, tell
+                TimeRange(drive, options, ending, tuple(sorted(asked, reverse=True))),
+                known,
+                pool,
+                tell,
+                paths[ending],
             ):
                 t = point.start_time_bound
                 if point is not known.get(t) and point.status != "NOT_FOUND":  # another attempt may find it
@@ -353,16 +357,19 @@ def pareto(
 
 
 def default_start_times(
-    drive: Machine, terminal: Terminal = "reached", count: int = COUNT, **options: Any
-) -> list[float]:
+    drive: Machine, terminal: Terminal = "reached", count: int = COUNT, *, path: StartPath | None = None,
+    **options: Any,
+) -> list[float]:  # fmt: skip
     """`count` start times in s, from 1.02 of the shortest found to 1.6 of that of `direct`.
 
     Closer together towards the short end, where the curve is steep. `options` go to `Problem`.
     """
-    shortest = shortest_start_time(Problem(drive, 1.0, terminal, **options))
-    if not math.isfinite(shortest):
+    problem = Problem(drive, 1.0, terminal, **options)
+    refuse_weak_curve(problem)
+    quickest = (path or StartPath(problem)).shortest
+    if quickest is None:
         raise OptimumError("No start time was found at which there is an optimum; name some to be tried.")
-    direct = simulate(drive, "direct").start_time
+    shortest, direct = quickest.end, simulate(drive, "direct").start_time
     longest = LONG * (direct if LONG * direct > 1.2 * shortest else shortest)  # direct may never get there
     share = np.linspace(0.0, 1.0, count) ** 2
     times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
@@ -380,12 +387,14 @@ class TimeRange(NamedTuple):
     def __str__(self) -> str:
         return f"the optima for start times of {self.start_times[-1]:.5g} s to {self.start_times[0]:.5g} s"
 
-    def point(self, start_time: float, near: TorqueProfile | None, follow: float = 0.0) -> FrontPoint:
-        """The point of one start time; `near` and `follow` as in `solve`."""
-        near = near and near.simplified(BEND)  # else the knots of all neighbours add up
+    def problem(self, start_time: float) -> Problem:
+        """The problem of one start time."""
+        return Problem(self.drive, start_time, self.terminal, **self.options)
+
+    def point(self, start_time: float, path: StartPath) -> FrontPoint:
+        """The point of one start time; `path` has the starts that are known at others."""
         try:
-            problem = Problem(self.drive, start_time, self.terminal, **self.options)
-            return FrontPoint.of_optimum(solve(problem, near, follow=follow), start_time)
+            return FrontPoint.of_optimum(solve(self.problem(start_time), path=path), start_time)
         except InfeasibleError as error:
             shortest = error.verdict.shortest_start_time
             return FrontPoint(
@@ -397,51 +406,15 @@ class TimeRange(NamedTuple):
 
 
 def computed(
-    asked: TimeRange, known: Mapping[float, FrontPoint], tell: Progress = lambda doing: None
-) -> Iterator[FrontPoint]:
-    """The points of a stretch but those that are known; a better one comes again.
-
-    What is infeasible makes all shorter ones so.
-
-    Most are followed from their neighbour. The first, the last and every few are searched from all first
-    demands; what that finds is followed back to longer start times as long as it is better there.
-    """
-    found: list[FrontPoint] = []
-    too_short: FrontPoint | None = None
-    count = len(asked.start_times)
+    asked: TimeRange, known: Mapping[float, FrontPoint], tell: Progress = lambda doing: None,
+    path: StartPath | None = None,
+) -> Iterator[FrontPoint]:  # fmt: skip
+    """The points of a stretch but those that are known."""
+    path = path or StartPath(asked.problem(1.0))
     for number, t in enumerate(asked.start_times):
-        if t in known:
-            too_short = known[t] if known[t].status == "INFEASIBLE" else too_short
-            found += [known[t]] if known[t].found else []
-            continue
-        tell(f"start time {number + 1} of {count}: {t:.5g} s, {asked.terminal}")
-        if too_short is not None and t < too_short.start_time_bound:
-            shortest = too_short.shortest_start_time
-            least = "" if shortest is None else f"; the shortest found is {shortest:.6g} s"
-            reason = f"A start time of {t:.6g} s is too short ({asked.terminal}){least}."
-            yield replace(too_short, start_time_bound=t, status_text=reason)
-            continue
-        searched = number % SEARCHED == 0 or number == count - 1
-        near, before = (found[-1].profile, found[-1].start_time_bound) if found else (None, 0.0)
-        point = asked.point(t, near, 0.0 if searched else before)
-        gaps = [one.optimality_gap_percent or 0.0 for one in (*found[-2:], point)]
-        if point.found and not searched and gaps[-1] - gaps[-2] > 2.0 * max(gaps[-2] - gaps[0], 0.0) + JUMP:
-            again = asked.point(t, near)
-            searched = again.found and (again.k_dyn or 0.0) < (point.k_dyn or 0.0) * (1.0 - BETTER)
-            point = again if searched else point
-        yield point
-        if point.status == "INFEASIBLE":
-            too_short = point
-        if not point.found:
-            continue
-        found.append(point)
-        for i in range(len(found) - 2, -1, -1) if searched else ():
-            after, now = found[i + 1], found[i]
-            again = asked.point(now.start_time_bound, after.profile, after.start_time_bound)
-            if not again.found or (again.k_dyn or 0.0) > (now.k_dyn or 0.0) * (1.0 - BETTER):
-                break
-            found[i] = again
-            yield again
+        if t not in known:
+            tell(f"start time {number + 1} of {len(asked.start_times)}: {t:.5g} s, {asked.terminal}")
+            yield asked.point(t, path)
 
 
 def _listed(asked: TimeRange) -> list[FrontPoint]:
@@ -449,12 +422,12 @@ def _listed(asked: TimeRange) -> list[FrontPoint]:
 
 
 def _points(
-    asked: TimeRange, known: dict[float, FrontPoint], pool: Pool, tell: Progress
+    asked: TimeRange, known: dict[float, FrontPoint], pool: Pool, tell: Progress, path: StartPath
 ) -> Iterator[FrontPoint]:
     """The points kept before, then the others; stretches of them by several workers."""
     yield from sorted(known.values(), key=lambda one: -one.start_time_bound)
     if pool.count == 1 and pool.scheduler is None:
-        yield from computed(asked, known, tell)
+        yield from computed(asked, known, tell, path)
         return
     missing = tuple(t for t in asked.start_times if t not in known)
     size = max(1, math.ceil(len(missing) / (CHUNKS * pool.count)))

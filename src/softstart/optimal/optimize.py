@@ -5,21 +5,20 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
 from softstart.chain.machines import MachineLike, as_machine, listed_of, quantity_of
-from softstart.controller import ready_controller_names
 from softstart.drive import Limits
 from softstart.drive.limits import Limit
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
-from softstart.kernel import records as rec
-from softstart.optimal import pulse_coast_hold, seeds
-from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
+from softstart.optimal import pulse_coast_hold
+from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time
 from softstart.optimal.check import check, replayed
-from softstart.optimal.descent import APART, MANY, MISSED, MOST_KNOTS, TASTE, Candidate, Descent
+from softstart.optimal.descent import Descent, Found
+from softstart.optimal.path import Path
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
     Infeasibility,
@@ -31,32 +30,19 @@ from softstart.optimal.result import (
     OptimumError,
     Trial,
 )
-from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve, rigid_start_time
+from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve
 from softstart.parallel import single_threaded_blas
 from softstart.profile import TorqueProfile
-from softstart.start.kernel_input import kernel_input
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
-RUNGS = (0.8, 0.9)  # of the start time: asked first where one torque serves several machines
-FIRST, BESIDE, FINISHED = 4, 2, 2  # first demands followed a few steps, beside a known one, to the end
-DAMPED = (0.02, 0.005)  # damping ratios through which an undamped chain is approached
-TRIES = 1500  # knots in all starts around one, where one torque serves several machines
-ALIKE = 1e-3  # of K_dyn: descents so near to each other lead to the same start
-SHORTEST = 1e-4  # of the shortest start time: how exactly it is found
-SCAN = 0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9  # between its bound and a start: where others are looked for
-# under a torque-speed curve no start is looked for that is shorter than that of a rigid drive by more than
-SWING, SWUNG = 0.5, 0.2  # so much of a period; so much of its time where the load alone has to be quick
-NARROW = 0.1  # between a bound and a start: then no other starts are looked for
-EDGE = 1e-6  # of the start time: so much longer than the shortest start
 WITHIN = 1e-5  # of the start time, and of a limit that is met
-NO_SHARE = 1e-9  # of a limit: its logarithm is taken, as a life falls with a power of the torque
-STAYS = 4  # times that one end stays: then the middle is tried
-MOST_TRIALS = 32
-LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
-ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
-TIGHT = 1e-5  # a bound within this share needs no other one
+TINY = 1e-7  # of the start time: by so much longer than its bound the closed form is tried
+LONGEST = 100.0  # times the shortest start within the permissible torque: none longer is looked for
+SUCCESSIVE = "successive linear programs on the exact start"
+
+Progress = Callable[[str], object]
 
 
 @single_threaded_blas
@@ -75,6 +61,7 @@ def optimize(
     limits: bool = False,
     confirm: bool = False,
     near: Optimum | TorqueProfile | None = None,
+    progress: Progress | None = None,
 ) -> Optimum:
     """Find the torque over time that starts a machine most gently within a given time, and bound how gently.
 
@@ -118,6 +105,9 @@ def optimize(
     near : Optimum or TorqueProfile, optional
         The answer to a similar question, one more first demand; the optima of each machine by itself
         (`alone`) are then left out.
+    progress : callable, optional
+        Called with a text as the work goes on: with the optimum of each start position as soon as it is
+        known, then on the way to the one torque that serves all.
 
     Returns
     -------
@@ -167,43 +157,44 @@ def optimize(
             raise InputError(
                 [f"{name}: limits asks for the least start time; leave this out." for name in wrong]
             )
-        return _within_limits(problem, known)
+        return _within_limits(problem)
     if asked_for is not None:
         end = asked_for.seconds(lambda: start_time_of_direct(machine, corners))
         problem = replace(problem, start_time=end)
+    tell = progress or (lambda doing: None)
+    asked = len(problem.machines) > 1 and near is None and problem.start_time is not None
+    alone = _alone(problem, tell) if asked else {}
     why = f"; no start time given: {asked_for} that of direct" if usual else ""
     try:
-        best = solve(problem, known, confirm)
+        best = solve(problem, known, confirm, Path(problem, tell))
     except InfeasibleError:
         if not usual or terminal is not None or problem.terminal == "reached":
             raise
-        best = solve(replace(problem, terminal="reached"), known, confirm)
+        problem = replace(problem, terminal="reached")
+        best = solve(problem, known, confirm)
         why += ", in which only the load can have the target speed"
-    asked = len(problem.machines) > 1 and near is None and problem.start_time is not None
-    alone = _alone(best.problem) if asked else {}
     return replace(best, why=best.why + why, alone=alone)
 
 
 @single_threaded_blas
 def solve(
-    problem: Problem, near: TorqueProfile | None = None, confirm: bool = False, follow: float = 0.0
+    problem: Problem, near: TorqueProfile | None = None, confirm: bool = False, path: Path | None = None
 ) -> Optimum:
-    """The optimum of a problem; see `optimize`.
-
-    Where `near` is the answer for a start time close by, `follow` in s, and a start is found from it, no
-    other first demand is tried.
-    """
+    """The optimum of a problem; see `optimize`. `path` has the starts that are known at other times."""
     began = time.perf_counter()
     if problem.minimise == "start_time":
-        return _least_start_time(problem, near, began)
+        return _least_start_time(problem, began)
     assert problem.start_time is not None
-    if problem.start_time < momentum_shortest_time(problem):
-        raise _too_short(problem, shortest_start_time(problem))
     refuse_weak_curve(problem)
+    path = path or Path(problem)
+    if problem.start_time < momentum_shortest_time(problem):
+        raise _too_short(problem, path)
     best = _by_formula(problem, began)
-    if best is None and near is not None and follow:
-        best = _followed(problem, near, problem.start_time / follow, began)
-    best = best or _by_descent(problem, near, began)
+    if best is None:
+        found = path.at(problem.start_time, near)
+        if found is None:
+            raise _too_short(problem, path)
+        best = _answer(problem, found, began)
     if confirm:
         best = _confirmed(best)
     return replace(best, seconds=time.perf_counter() - began)
@@ -219,153 +210,9 @@ def _by_formula(problem: Problem, began: float) -> Optimum | None:
     return _checked(problem, profile, end, k_dyn, "closed-form", "pulse, coast, hold is optimal here", began)
 
 
-def _by_descent(problem: Problem, near: TorqueProfile | None, began: float) -> Optimum:
-    assert problem.start_time is not None
-    found = None if problem.start_time < _hardly_shorter(problem) else searched(problem, near)
-    if found is None or found[1].missed > MISSED:
-        found = _sooner(problem)
-    return _answer(problem, *found, began)
-
-
-def _followed(problem: Problem, near: TorqueProfile, scale: float, began: float) -> Optimum | None:
-    """The local optimum below the answer for a start time close by, as it is or scaled in time, if any."""
-    search, firsts = Descent(problem), []
-    search.apart = APART
-    for share in (1.0, scale):
-        demand = TorqueProfile(near.time * share, near.torque)
-        start = search.play(search.onto(demand), search.latest)
-        firsts += [] if start is None else [(start.merit, share, demand)]
-    for *_, demand in sorted(firsts, key=lambda one: one[:2])[:1]:
-        found = search.down(demand, search.latest, least=ROUGH)
-        found = None if found is None else search.finished(search.refined(found, 1))
-        if found is not None and found.missed <= MISSED:
-            profile = TorqueProfile(search.time, found.torques).simplified()
-            with suppress(OptimumError):
-                return _answer(problem, "the answer for the next start time", found, profile, began)
-    return None
-
-
-def _answer(problem: Problem, name: str, best: Candidate, profile: TorqueProfile, began: float) -> Optimum:
-    claimed = {"k_dyn": best.peak / problem.base_torque, "heat": best.heat}[problem.minimise]
-    why = f"successive linear programs on the exact start, from {name}"
-    return _checked(problem, profile, best.end, claimed, "descent", why, began)
-
-
-def _sooner(problem: Problem) -> tuple[str, Candidate, TorqueProfile]:
-    """A start from the shortest one found, where none was from others; the refusal if that takes longer."""
-    shortest = _shortest(problem)
-    assert problem.start_time is not None
-    if shortest is None or shortest[0] > problem.start_time:
-        raise _too_short(problem, math.inf if shortest is None else shortest[0])
-    end = min(shortest[0] * (1.0 + EDGE), problem.start_time)
-    return _at_the_edge(replace(problem, start_time=end), shortest[1])
-
-
-def _at_the_edge(problem: Problem, demand: TorqueProfile) -> tuple[str, Candidate, TorqueProfile]:
-    """The gentlest start in the shortest time, in which a demand ends; else that of the demand itself."""
-    assert problem.start_time is not None
-    search = Descent(problem)
-    found = None if _too_long(search) else searched(problem, demand)
-    if found is None or found[1].missed > MISSED:
-        search.apart = APART
-        start = search.into(demand, problem.start_time)
-        start = None if start is None else search.finished(start)
-        if start is not None:
-            found = "", start, TorqueProfile(search.time, start.torques).simplified()
-    if found is None or found[1].missed > MISSED:
-        raise OptimumError(
-            f"No start of {problem.drive.name} within {problem.start_time:.6g} s was found that keeps all "
-            "bounds, though one exists; ask for more time."
-        )
-    return "the shortest start found", *found[1:]
-
-
-def _too_long(search: Descent) -> bool:
-    """Whether a descent takes minutes and ends worse than it began: many knots under a torque-speed curve."""
-    return bool(search.problem.torque_speed) and search.even.size > MANY
-
-
-def searched(
-    problem: Problem, near: TorqueProfile | None = None, quick: bool = False
-) -> tuple[str, Candidate, TorqueProfile] | None:
-    """The best start by descents, the name of its first demand, and its profile; None if there was none.
-
-    Where one torque serves several machines there are many local optima: a start of a shorter time is found
-    first, and others are looked for around each.
-    """
-    search = Descent(problem)
-    several = len(problem.machines) > 1
-    long = several and search.even.size > MANY
-    if near is None and not quick and not long:
-        for like in _easier(problem):
-            known = searched(like, near, quick=True)
-            near = near if known is None or known[1].missed > MISSED else known[2]
-    firsts = _first_demands(search, near)
-    if problem.terminal != "reached":  # begin with an easier end
-        easier = Descent(replace(problem, terminal="reached"), search.players)
-        direct = firsts if problem.terminal == "steady" else firsts[:FINISHED]
-        firsts = [*_tasted(easier, firsts)[:FINISHED], *direct]
-    done, merits = [], list[float]()
-    for name, demand in _tasted(search, firsts)[: 1 if long else FINISHED]:
-        found = search.down(demand, search.latest)
-        if found is None or any(abs(found.merit - one) < ALIKE * one for one in merits):
-            continue
-        merits.append(found.merit)
-        if several and len(merits) == 1 and found.missed <= MISSED:
-            found = search.around(found, max(TRIES // search.even.size, 4))
-        found = found if quick else search.finished(search.refined(found))
-        if found is not None:
-            done.append((name, found, TorqueProfile(search.time, found.torques).simplified()))
-    return min(done, key=lambda one: (one[1].missed > MISSED, one[1].objective), default=None)
-
-
-def _easier(problem: Problem) -> Iterator[Problem]:
-    """Problems whose answers lead to a good one of this: shorter starts of several machines, damped chains.
-
-    From strategies an undamped chain comes to poor local optima, and one torque for several machines often.
-    """
-    assert problem.start_time is not None
-    shafts = kernel_input(problem.machines[0]).shafts[0].view(rec.SHAFT)[:, 0]
-    if len(problem.machines) > 1:
-        for share in RUNGS:
-            shorter = replace(problem, start_time=share * problem.start_time)
-            if share * problem.start_time > momentum_shortest_time(shorter):
-                yield shorter
-    elif shafts.size > 1 and not shafts["d"].any():
-        base = problem.base or problem.drive
-        for ratio in DAMPED:
-            yield replace(problem, drive=problem.drive.with_damping_ratio(ratio), base=base)
-
-
-def _tasted(search: Descent, firsts: list[tuple[str, TorqueProfile]]) -> list[tuple[str, TorqueProfile]]:
-    """First demands after a few steps, the best first; of those that are alike one."""
-    after: list[tuple[float, str, TorqueProfile]] = []
-    for name, demand in firsts:
-        found = search.down(demand, search.latest, TASTE, 1e-3)
-        if found is not None:
-            after.append((found.merit, name, TorqueProfile(search.time, found.torques)))
-    after.sort(key=lambda one: one[0])
-    apart = [b for a, b in itertools.pairwise([(0.0, "", None), *after]) if b[0] > a[0] * (1.0 + 1e-4)]
-    return [(name, demand) for _, name, demand in apart if demand is not None]
-
-
-def _first_demands(search: Descent, near: TorqueProfile | None) -> list[tuple[str, TorqueProfile]]:
-    """The answer to a similar question; then, the gentlest first, closed forms, pulses and strategies."""
-    first = [] if near is None else [("the answer to a similar question", near)]
-    own = [("pulse, coast, level", one) for one in seeds.pulse_coast_level(search)[:FINISHED]]
-    for player in search.players:
-        formula = seeds.pulse_coast_hold(search, player)
-        own += [] if formula is None else [("pulse, coast, hold", formula)]
-        own += [
-            (name, one) for name in ready_controller_names() if (one := seeds.trace(search, player, name))
-        ]
-    found: list[tuple[float, str, TorqueProfile]] = []
-    for name, demand in own:
-        start = search.play(search.onto(demand), search.latest)
-        found += [] if start is None else [(start.merit, name, demand)]
-    found.sort(key=lambda one: one[0])
-    many = (FIRST if near is None else BESIDE) + 2 * (len(search.players) - 1)
-    return [*first, *[(name, demand) for _, name, demand in found[:many]]]
+def _answer(problem: Problem, found: Found, began: float, why: str = SUCCESSIVE) -> Optimum:
+    claimed = {"k_dyn": found.peak / problem.base_torque, "heat": found.heat, "start_time": found.end}
+    return _checked(problem, found.profile, found.end, claimed[problem.minimise], "descent", why, began)
 
 
 def _checked(
@@ -374,19 +221,9 @@ def _checked(
 ) -> Optimum:  # fmt: skip
     """An answer that has passed the exact machine, with its bound."""
     runs = replayed(problem, profile, end)
-    if problem.terminal == "reached":
-        end = max(run.start_time for run in runs)
     bound = momentum_bound(
-        problem if problem.start_time else replace(problem, start_time=end, minimise="k_dyn")
+        problem if problem.start_time else replace(problem, start_time=end, minimise="k_dyn", k_dyn=None)
     )
-    k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
-    if _certifiable(problem, method) and k_dyn > bound.k_dyn * (1.0 + TIGHT):
-        from softstart.optimal.certificate import certified_bound
-
-        closed = [event.time for event in runs[0].events if event.kind == "gap closed" and event.time < end]
-        if len(closed) <= 1:  # it covers these only
-            certified = certified_bound(problem, k_dyn, entry_near=runs[0].first_contact)
-            bound = max(bound, certified, key=lambda one: one.k_dyn)
     check(problem, profile, runs, end, claimed, bound)
     least = least_heat(problem) if problem.minimise == "heat" else 0.0
     seconds = time.perf_counter() - began
@@ -396,16 +233,7 @@ def _checked(
     )  # fmt: skip
 
 
-def _certifiable(problem: Problem, method: Method) -> bool:
-    """Whether the certificate covers the problem: one drive with an ideal torque."""
-    from softstart.optimal.certificate import not_certified
-
-    alone = problem.minimise == "k_dyn" and problem.heat is None and len(problem.machines) == 1
-    pair = two_masses(problem.machines[0]) if alone and method != "closed-form" else None
-    return pair is problem.drive and problem.ideal_torque and not not_certified(problem)
-
-
-def _alone(problem: Problem) -> dict[str, Optimum]:
+def _alone(problem: Problem, tell: Progress) -> dict[str, Optimum]:
     """The optimum of each machine by itself, of equal ones once."""
     names = dict[Machine, str]()
     for number, each in enumerate((problem.drive, *problem.scenarios), start=1):
@@ -416,7 +244,8 @@ def _alone(problem: Problem) -> dict[str, Optimum]:
     for machine, name in names.items():
         one = replace(problem, drive=machine, base=problem.base or problem.drive, scenarios=())
         with suppress(InfeasibleError, OptimumError, SimulationError):
-            found[name] = _by_formula(one, time.perf_counter()) or _by_descent(one, None, time.perf_counter())
+            found[name] = solve(one)
+            tell(f"{name} alone: K_dyn {found[name].k_dyn:.4g}")
     return found
 
 
@@ -425,19 +254,17 @@ def _confirmed(best: Optimum) -> Optimum:
     from softstart.optimal import statement
 
     problem, began = best.problem, time.perf_counter()
+    assert problem.start_time is not None
     try:
         claim = statement.solve_collocation(problem, whole_run(best), straight=True)
-        search = Descent(problem)
-        torques = search.onto(claim.profile)
-        found = search.play(torques, min(claim.end_time, search.latest))
+        search = Descent(problem, problem.start_time)
+        found = search.play(search.onto(claim.profile), min(claim.end_time, search.latest))
         found = None if found is None else search.finished(found)
         if found is None:
             raise OptimumError("its demand could not be simulated.")
-        profile = TorqueProfile(search.time, found.torques).simplified()
         value = {"k_dyn": found.peak / search.base, "heat": found.heat}[problem.minimise]
-        other = _checked(
-            problem, profile, found.end, value, "collocation", f"gentler than {best.method}", began
-        )
+        why = f"gentler than {best.method}"
+        other = _checked(problem, found.profile, found.end, value, "collocation", why, began)
     except (InputError, NotConverged, OptimumError) as failed:
         trial = Trial("collocation", None, time.perf_counter() - began, str(failed))
         return replace(best, tried=(*best.tried, trial))
@@ -484,97 +311,67 @@ def shortest_start_time(problem: Problem) -> float:
     >>> round(shortest_start_time(Problem(drive, 0.3, "reached")), 4)
     0.0804
     """
-    found = _shortest(problem)
-    return math.inf if found is None else found[0]
-
-
-def _hardly_shorter(problem: Problem) -> float:
-    """A time in s below which no start under a torque-speed curve is looked for; 0 without one."""
-    rigid = rigid_start_time(problem)
-    if problem.terminal == "reached":
-        return (1.0 - SWUNG) * rigid
-    return rigid - SWING * max(float(machine.elastic_period) for machine in problem.machines)
-
-
-def _shortest(problem: Problem, near: TorqueProfile | None = None) -> tuple[float, TorqueProfile] | None:
-    """The shortest t_f in s within which a start was found, by halving, and that start."""
     refuse_weak_curve(problem)
-    low, rigid = max(momentum_shortest_time(problem), _hardly_shorter(problem)), rigid_start_time(problem)
-    period = max(float(machine.elastic_period) for machine in problem.machines)
-    longest = LONGEST * (low + period)
-    high = max(low, rigid) + 0.2 * period
-    with suppress(SimulationError):
-        high = max(high, *(start_time_of_direct(one) for one in problem.machines))
-    timed = replace(problem, minimise="k_dyn", k_dyn=None, start_time=1.0)
-    demand = None
-    while demand is None:
-        found = searched(replace(timed, start_time=high), near, quick=True)
-        if found is not None and found[1].missed <= MISSED:
-            demand = found[2]
-        else:
-            low, high = high, 1.3 * high + 0.1 * period
-            if high > longest:
-                return None
-    scan = SCAN if low < (1.0 - NARROW) * high else ()  # starts unlike that one may be shorter
-    for middle in (low + share * (high - low) for share in scan):
-        found = searched(replace(timed, start_time=middle), quick=True)
-        if found is not None and found[1].missed <= MISSED:
-            high, demand = middle, found[2]
-            break
-    while high - low > SHORTEST * high:
-        middle = 0.5 * (low + high)
-        search = Descent(replace(timed, start_time=middle))
-        search.apart = APART if demand.time.size > MOST_KNOTS else search.apart  # else knots add up
-        tried = search.into(demand, middle)
-        if tried is not None and tried.missed <= MISSED:
-            high, demand = middle, TorqueProfile(search.time, tried.torques)
-        else:
-            low = middle
-    return high, demand
+    found = Path(problem).shortest
+    return math.inf if found is None else found.end
 
 
-def _too_short(problem: Problem, shortest: float) -> InfeasibleError:
+def _too_short(problem: Problem, path: Path) -> InfeasibleError:
+    """The refusal, with the shortest start that was found and the proved bound."""
     assert problem.start_time is not None
-    proved = problem.start_time < momentum_shortest_time(problem)
-    known = "none was found" if math.isinf(shortest) else f"the shortest start found takes {shortest:.6g} s"
+    least, found = momentum_shortest_time(problem), path.shortest
+    shortest = math.inf if found is None else found.end
+    known = "none was found" if found is None else f"the shortest start found takes {shortest:.6g} s"
     bounds = "" if problem.heat is None else f" and a heat of {problem.heat:g} s"
     sentence = (
-        f"No torque {'' if proved else 'was found that '}brings {problem.drive.name} to {problem.target:g} "
-        f"rad/s ({problem.terminal}) within {problem.start_time:.6g} s{bounds}; {known}."
+        f"No torque {'' if problem.start_time < least else 'was found that '}brings {problem.drive.name} to "
+        f"{problem.target:g} rad/s ({problem.terminal}) within {problem.start_time:.6g} s{bounds}; {known}, "
+        f"and none takes less than {least:.6g} s."
     )
-    return InfeasibleError(Infeasibility(problem, shortest, sentence))
+    profile = None if found is None else found.profile
+    return InfeasibleError(Infeasibility(problem, shortest, sentence, least, profile))
 
 
-def _least_start_time(problem: Problem, near: TorqueProfile | None, began: float) -> Optimum:
-    """The first start time whose gentlest start has the K_dyn allowed; the shortest one if any has."""
-    if problem.k_dyn is None:
-        found = _shortest(problem, near)
-        if found is None:
-            sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
-            raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
-        for edge in (EDGE, 10.0 * EDGE, SHORTEST):  # at the very edge no descent may end well
-            timed = replace(problem, minimise="k_dyn", start_time=found[0] * (1.0 + edge))
-            with suppress(OptimumError):
-                best = _answer(timed, *_at_the_edge(timed, found[1]), began)
-                break
-        else:
-            raise OptimumError(f"No start near the shortest found, {found[0]:.6g} s, keeps all bounds.")
-        gentle = "" if _too_long(Descent(timed)) else ", the gentlest of these"
-        why = f"the shortest start found{gentle}; {best.why}"
-        best = replace(best, problem=problem, why=why)
-        return replace(best, kept=_kept(best, Limits(), momentum_shortest_time(problem)))
+def _least_start_time(problem: Problem, began: float) -> Optimum:
+    """The shortest start, or the shortest one within the K_dyn allowed."""
+    found, at_least, quicker = _shortest_within(problem, began)
     bound = Limit("K_dyn", "1", "k_dyn", problem.k_dyn)
-
-    def margins(best: Optimum) -> tuple[Margin, ...]:
-        return (Margin(bound, best.k_dyn, ""),)
-
-    best, at_least, refused = _first_that_keeps(problem, margins, problem.k_dyn)
-    best = replace(best, problem=problem, claimed=best.end_time)
-    kept = _kept(best, Limits(), at_least, refused, margins(best))
-    return replace(best, kept=kept, seconds=time.perf_counter() - began)
+    margins = () if problem.k_dyn is None else (Margin(bound, found.k_dyn, ""),)
+    refused = None if quicker is None else Margin(bound, quicker.peak / problem.base_torque, "")
+    return replace(found, kept=_kept(found, Limits(), at_least, refused, margins))
 
 
-def _within_limits(problem: Problem, near: TorqueProfile | None) -> Optimum:
+def _shortest_within(problem: Problem, began: float) -> tuple[Optimum, float, Found | None]:
+    """The shortest start within the K_dyn allowed, the time that momentum asks for, and what is quicker."""
+    refuse_weak_curve(problem)
+    at_least = momentum_shortest_time(problem)
+    if problem.k_dyn is not None:
+        timed = replace(problem, k_dyn=None, minimise="k_dyn", start_time=1.0)
+        at_least = _soonest(timed, problem.k_dyn)
+        exact = _by_formula(replace(timed, start_time=at_least * (1.0 + TINY)), began)
+        if exact is not None and exact.k_dyn <= problem.k_dyn:
+            return replace(exact, problem=problem, claimed=exact.end_time), at_least, None
+    path = Path(replace(problem, k_dyn=None))
+    if path.shortest is None:
+        sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
+        raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
+    if problem.k_dyn is None or path.shortest.peak <= problem.k_dyn * problem.base_torque:
+        best = _answer(
+            problem, path.gentlest(path.shortest), began, f"the shortest start found; {SUCCESSIVE}"
+        )
+        return best, at_least, None
+    found, quicker = path.quickest_within(problem.k_dyn)
+    if found is None:
+        least = quicker.peak / problem.base_torque
+        sentence = (
+            f"limits: no start of {problem.drive.name} with a K_dyn of {problem.k_dyn:.4g} was found; the "
+            f"gentlest one found has {least:.4g}."
+        )
+        raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
+    return _answer(problem, found, began), at_least, quicker
+
+
+def _within_limits(problem: Problem) -> Optimum:
     """The first start time whose gentlest start keeps the permissible shaft torque and the life."""
     began = time.perf_counter()
     limits = checked_limits(problem.drive)
@@ -583,77 +380,55 @@ def _within_limits(problem: Problem, near: TorqueProfile | None) -> Optimum:
             f"limits: {problem.drive.name or 'the drive'} has no permissible shaft torque; give "
             "limits.shaft_torque, or a life with [limits.fatigue]."
         )
-    timeless = replace(limits, start_time=None)
+    most = None if limits.shaft_torque is None else limits.shaft_torque / problem.base_torque
+    timed = replace(problem, start_time=None, minimise="start_time", k_dyn=most)
+    best, at_least, quicker = _shortest_within(timed, began)
+    refused = next(
+        (Margin(one, quicker.peak, "") for one in limits.each if quicker and one.figure == "peak_torque"),
+        None,
+    )
+    if limits.life is not None:
+        best, refused = _that_lasts(problem, best, replace(limits, start_time=None), refused, began)
+    best = replace(best, problem=problem, claimed=best.k_dyn, seconds=time.perf_counter() - began)
+    return replace(best, kept=_kept(best, limits, at_least, refused))
 
-    def margins(best: Optimum) -> tuple[Margin, ...]:
-        return tuple(one for run in best.runs for one in Row(run, None, worst_case=()).margins(timeless))
 
-    most = math.inf if limits.shaft_torque is None else limits.shaft_torque / problem.base_torque
-    best, at_least, refused = _first_that_keeps(problem, margins, most)
-    kept = _kept(best, limits, at_least, refused)
-    return replace(best, kept=kept, seconds=time.perf_counter() - began)
+def _that_lasts(
+    problem: Problem, best: Optimum, limits: Limits, refused: Margin | None, began: float
+) -> tuple[Optimum, Margin | None]:
+    """The first start that also keeps the life, at a time after that of `best`.
 
-
-def _first_that_keeps(
-    problem: Problem, margins: Callable[[Optimum], tuple[Margin, ...]], most: float
-) -> tuple[Optimum, float, Margin | None]:
-    """The first start that keeps its limits, among the gentlest of each start time.
-
-    K_dyn of the gentlest start falls with the start time: regula falsi with the Illinois rule (M. Dowell,
-    P. Jarratt, BIT 11 (1971) 168-174, doi:10.1007/BF01934364), which halves the value of an end that stays,
-    over the logarithm of the share of the limit; where an end stays too long, the middle. A life may be kept
-    by a start that is not the gentlest: then the one that keeps it is followed to shorter times.
-
-    Also the time before which no start has a K_dyn of `most` or less, by momentum, and by what the next
-    quicker start exceeds its limits; None if there is no such start.
+    K_dyn of the gentlest start falls with the start time, and the life it uses with a power of it. A life may
+    be kept by a start that is not the gentlest: the one that keeps it is followed to shorter times.
     """
 
-    def share_left(best: Optimum) -> tuple[float, Margin | None]:
-        return min(((one.share, one) for one in margins(best)), key=lambda pair: pair[0], default=(1.0, None))
+    def tightest(one: Optimum) -> Margin:
+        margins = [each for run in one.runs for each in Row(run, None, worst_case=()).margins(limits)]
+        return min(margins, key=lambda each: each.share)
 
-    timed = replace(problem, minimise="k_dyn", k_dyn=None, start_time=1.0)
-    soonest = _soonest(timed, most)
-    low, high, end = 0.0, math.inf, soonest * (1.0 + WITHIN)
-    f_low, f_high, found, near, stays, refused = math.inf, -math.inf, None, None, 0, None
-    for _ in range(MOST_TRIALS):
-        try:
-            best = solve(replace(timed, start_time=end), near)
-        except OptimumError:  # of two that are near to each other one is found
-            end *= 1.0 + 3.0 * WITHIN
-            continue
-        except InfeasibleError as none:
-            if math.isinf(none.verdict.shortest_start_time):
-                raise
-            low, f_low, refused = max(end, none.verdict.shortest_start_time), math.inf, None
-            end = low * (1.0 + EDGE) if math.isinf(high) else 0.5 * (low + high)
-            continue
-        left, tight = share_left(best)
-        if found is not None and left < 0.0 and tight is not None and tight.of.figure == "used_life":
-            other = _followed(best.problem, found.profile, end / found.end_time, time.perf_counter())
-            best = best if other is None else max(best, other, key=lambda one: share_left(one)[0])
-            left, tight = share_left(best)
-        near, over = best.profile, math.log(max(1.0 - left, NO_SHARE))
-        if over <= 0.0:
-            f_low *= 0.5 if stays > 0 else 1.0
-            found, high, f_high, stays = best, end, over, max(stays, 0) + 1
-            if over > -WITHIN:
+    if tightest(best).share >= -WITHIN:
+        return best, refused
+    path, low, high, found = Path(problem), best.end_time, math.inf, None
+    refused, longest = tightest(best), LONGEST * best.end_time
+    while not high - low <= WITHIN * low:
+        end = math.sqrt(low * high) if found else 1.2 * low
+        timed = replace(problem, start_time=end)
+        tried = [path.at(end), None if found is None else path.followed(path.descent(end), found)]
+        answers = [_answer(timed, one, began) for one in tried if one is not None]
+        one = max(answers, key=lambda each: tightest(each).share)
+        tight = tightest(one)
+        if tight.share >= 0.0:
+            best, high, found = one, end, tried[answers.index(one)] or found
+            if tight.share < WITHIN:
                 break
         else:
-            f_high *= 0.5 if stays < 0 and found is not None else 1.0
-            low, f_low, stays, refused = end, over, min(stays, 0) - 1, tight
-        if high - low <= WITHIN * end or (end <= soonest * (1.0 + 2.0 * WITHIN) < end and over <= 0.0):
-            break
-        if math.isinf(high):
-            end *= 1.0 + min(max(over, 0.02), 1.0)
-        elif math.isfinite(f_low) and abs(stays) < STAYS:
-            end = low + (high - low) * min(max(f_low / (f_low - f_high), 0.02), 0.98)
-        else:
-            end = 0.5 * (low + high)
-    if found is None:
-        name = problem.drive.name
-        sentence = f"limits: no start of {name} that keeps them was found up to {end:.4g} s."
-        raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
-    return found, soonest, refused
+            low, refused = end, tight
+        if low > longest:
+            sentence = (
+                f"limits: no start of {problem.drive.name} that keeps them was found up to {end:.4g} s."
+            )
+            raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
+    return best, refused
 
 
 def _soonest(problem: Problem, most: float) -> float:

@@ -18,7 +18,7 @@ from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
 Method = Literal["closed-form", "descent", "collocation"]
-BoundKind = Literal["certificate", "momentum", "none"]
+BoundKind = Literal["duality", "certificate", "momentum", "none"]
 BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left
 
 
@@ -141,6 +141,8 @@ class Optimum(Result, view="optima.optimum_sheet"):
         Where the quickest start was asked for, how it keeps the limits, and the lower bound of its time.
     heat_at_least : float
         Where the heat is minimised: no start has less, s.
+    bound_once : LowerBound or None
+        What no start goes below whose gap closes once and stays closed; None where only `bound` is known.
 
     Examples
     --------
@@ -163,6 +165,7 @@ class Optimum(Result, view="optima.optimum_sheet"):
     tried: tuple[Trial, ...] = ()
     kept: Kept | None = None
     heat_at_least: float = 0.0
+    bound_once: LowerBound | None = None
 
     @property
     def k_dyn_each(self) -> tuple[float, ...]:
@@ -282,6 +285,8 @@ class Infeasibility:
     problem: Problem
     shortest_start_time: float  # the shortest one found; inf if none was
     sentence: str
+    at_least: float = 0.0  # no start is shorter, s
+    shortest: TorqueProfile | None = None  # the torque of the shortest start found
 
     def summary(self) -> dict[str, Any]:
         """The verdict under the names used everywhere."""
@@ -292,6 +297,7 @@ class Infeasibility:
             "terminal": self.problem.terminal,
             "start_time_bound": self.problem.start_time,
             "shortest_start_time": self.shortest_start_time,
+            "start_time_lower_bound": self.at_least,
         }
 
 

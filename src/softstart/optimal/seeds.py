@@ -1,9 +1,10 @@
-"""First demands for a descent: closed form, strategies, the answer to a similar question, a global search."""
+"""First demands for a descent: closed form, the gentlest of a few hundred pulses, random switching."""
 
 from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -12,9 +13,8 @@ from softstart.optimal.descent import Descent
 from softstart.optimal.pulse_coast_hold import PulseCoastHoldStarts
 from softstart.optimal.starts import DemandSimulator
 from softstart.profile import TorqueProfile
-from softstart.start.simulation import simulate
 
-TRACE = 4001  # instants of a trace that becomes a first demand
+EARLY = 0.6  # share of the demands that switch early, and of the others that end with the highest torque
 HALVINGS = 24
 LEVELS = 7
 PULSES = (0.15, 0.25, 0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 1.0)
@@ -111,11 +111,21 @@ def _level(search: Descent, t1: float, t2: float, low: float) -> tuple[float, To
     return max(player.figures(demand(b), search.latest)[0] for player in search.players), demand(b)
 
 
-def trace(search: Descent, player: DemandSimulator, name: str) -> TorqueProfile | None:
-    """The torque of a strategy on this machine, as a demand; None where it does not start it."""
-    try:
-        run = simulate(player.machine, name)
-    except (InputError, SimulationError):
-        return None
-    times = np.linspace(0.0, min(run.end_time, search.until), TRACE)
-    return search.averaged(times, run.at(times)["u"])
+def switching(search: Descent, span: float, count: int) -> Iterator[TorqueProfile]:
+    """Demands that switch between the limits of the torque at random instants, s, most of them early.
+
+    A quick start has a torque at its limits, and swings of the masses that end together: a few switches in
+    the first two periods choose them. The random numbers are the same each time.
+    """
+    rng = np.random.default_rng(1)
+    for _ in range(count):
+        few = rng.random() < EARLY
+        switches = int(rng.integers(1, 4 if few else 6))
+        until = min(span, 2.0 * search.period) if few else span
+        times = np.sort(rng.uniform(0.0, until, switches))
+        levels = np.resize([1.0, 0.0], switches + 1)
+        if few:
+            levels[:-1] = rng.choice([0.0, 1.0], switches)
+        levels[-1] = 1.0 if few or rng.random() < EARLY else levels[-1]
+        torques = search.low + (search.high - search.low) * levels
+        yield TorqueProfile.steps([0.0, *times, max(search.until, 1.01 * until)], torques)

@@ -26,19 +26,14 @@ class DemandRun:
 
     profile: TorqueProfile
     trajectory: Trajectory
+    weights: Matrix | float = (
+        1.0  # of the torques at the knots, N m, for a unit of each unknown of the demand
+    )
 
     @property
     def peak(self) -> float:
         """Largest |T| of all shafts, N m, located."""
         return float(np.abs(self.trajectory.shafts["peak"]).max())
-
-    def reached(self, target: float, latest: float, load: int) -> float:
-        """When the load first has its target speed, s; if not until `latest`, when it comes nearest to it."""
-        time = float(self.trajectory.notes.start_time)
-        if time <= latest:
-            return time
-        times = np.linspace(0.5 * latest, latest, 257)
-        return float(times[np.argmax(self.trajectory.at(times)["w"][:, load])])
 
     def instants(self, step: float) -> Vector:
         """Both sides of every joint of spans and instants in between, no further apart than `step`, s."""
@@ -71,19 +66,21 @@ class DemandRun:
         return times[inside].ravel(), (half * weights)[inside].ravel()
 
     def torques_by_demand(self, times: ArrayLike) -> NDArray[np.float64]:
-        """dT_k(times[j])/du_q as [j, k, q], in N m/(N m)."""
-        return self.trajectory.sensitivities(self.profile.time, times)[0]
+        """dT_k(times[j])/dx_q of the unknowns x of the demand as [j, k, q]."""
+        found = self.trajectory.sensitivities(self.profile.time, times)[0]
+        return self._of_unknowns(found)
 
     def along_contacts(self, times: Vector) -> tuple[Matrix, Matrix]:
         """How instants move that keep their place between the contacts, and dT_k/dt there.
 
-        A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/du = -(dtheta_k/du)/theta_k'; in
-        between the shift is interpolated, and it is none at both ends. Shapes (j, q) in s/(N m) and (j, k).
+        A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/dx = -(dtheta_k/dx)/theta_k'; in
+        between the shift is interpolated, and it is none at both ends. Shapes (j, q) per unknown and (j, k).
         """
         trajectory = self.trajectory
         events = trajectory.events[trajectory.events["kind"] == rec.CLOSED]
         events = events[(events["time"] > 0.0) & (events["time"] < times[-1])]
-        moved = np.zeros((times.size, self.profile.time.size))
+        count = self.profile.time.size if isinstance(self.weights, float) else self.weights.shape[1]
+        moved = np.zeros((times.size, count))
         if events.size:
             shafts = events["place"].astype(int)
             when = trajectory.at(events["time"])["w"]
@@ -101,7 +98,13 @@ class DemandRun:
 
     def state_by_demand(self, marks: ArrayLike) -> NDArray[np.float64]:
         """Of twists, speeds and realised torque at rising marks: the derivatives as [j, part, q]."""
-        return self.trajectory.sensitivities(self.profile.time, (), marks)[1]
+        found = self.trajectory.sensitivities(self.profile.time, (), marks)[1]
+        return self._of_unknowns(found)
+
+    def _of_unknowns(self, found: NDArray[np.float64]) -> NDArray[np.float64]:
+        by = self.weights
+        whole: NDArray[np.float64] = found * by if isinstance(by, float) else found @ by
+        return whole
 
 
 class DemandSimulator:
@@ -124,12 +127,12 @@ class DemandSimulator:
         recorder = StartRecorder(self.rows, int(made.sensors), room)
         return recorder, run_one(made, self.machine, recorder, until)
 
-    def play(self, profile: TorqueProfile, until: float) -> DemandRun:
+    def play(self, profile: TorqueProfile, until: float, weights: Matrix | float = 1.0) -> DemandRun:
         """The start from 0 to `until` in s; SimulationError if it cannot be finished."""
         recorder, reason = self._run(profile, until, self._room)
         ended(recorder.state, reason, until, MAX_EVENTS, self.machine.name)
         self._room = max(self._room, recorder.spans.shape[0])
-        return DemandRun(profile, recorder.finished())
+        return DemandRun(profile, recorder.finished(), weights)
 
     def figures(self, profile: TorqueProfile, until: float) -> tuple[float, float, float]:
         """Largest |T| of all shafts until then, N m; start time, s (inf if none); load speed then, rad/s."""

@@ -16,11 +16,11 @@ from softstart.errors import InputError
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
 from softstart.optimal.front import FrontPoint, TimeRange
 from softstart.optimal.optimize import optimize
+from softstart.optimal.path import Path as StartPath
 from softstart.optimal.problem import Problem, Terminal
 from softstart.optimal.pulse_coast_hold import NotApplicable, applies, solve_pulse_coast_hold
 from softstart.parallel import DiedError, Worker
 from softstart.parallel import Progress as WorkerProgress
-from softstart.profile import TorqueProfile
 from softstart.results import OneLine
 from softstart.start.recommendation import Row
 
@@ -202,15 +202,8 @@ def _in_own_process(
 
 
 def stream_optima(drive: Machine, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
-    """Look for the optima of start times and send each at once: the first one first, then by distance to it.
-
-    Each begins with the optimum of the nearest start time that has one.
-    """
-    near: dict[float, TorqueProfile] = {}
+    """Look for the optima of start times and send each at once: the first one, then by distance to it."""
     question = TimeRange(drive, {}, TERMINAL)
+    path = StartPath(question.problem(1.0))
     for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
-        nearest = min(near, key=lambda one: abs(one - start_time), default=math.nan)
-        point = question.point(start_time, near.get(nearest))
-        if point.found:
-            near[start_time] = point.profile
-        progress.part(point)
+        progress.part(question.point(start_time, path))

@@ -20,7 +20,7 @@ from softstart import Run, simulate
 from softstart.controller import make_controller
 from softstart.errors import InputError, SimulationError
 from softstart.optimal import pulse_coast_hold, statement
-from softstart.optimal.optimize import searched
+from softstart.optimal.path import Path as StartPath
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
 from softstart.study import Claim, Progress, Study, StudyResult, Table, Verdict
@@ -62,11 +62,10 @@ def closed_form(start_time: float) -> Answer:
 def descent(start_time: float) -> Answer:
     """softstart: successive linear programs on the exact start, HiGHS."""
     problem = Problem(DRIVE, start_time)
-    found = searched(problem)
-    if found is None:
+    best = StartPath(problem).at(start_time)
+    if best is None:
         raise RuntimeError("no start was found.")
-    _, best, profile = found
-    return Answer(best.peak / problem.base_torque, profile, best.end)
+    return Answer(best.peak / problem.base_torque, best.profile, best.end)
 
 
 def collocation(start_time: float) -> Answer:

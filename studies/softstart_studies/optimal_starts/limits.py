@@ -134,8 +134,8 @@ def descended(gap: float, time: float) -> float:
     >>> round(descended(0.5, 0.2883042), 3)
     0.909
     """
-    search = Descent(Problem(crane(gap), time, "reached"))
-    found = search.down(TorqueProfile([0.0], [search.high]), time)
+    search = Descent(Problem(crane(gap), time, "reached"), time)
+    found = search.down(TorqueProfile([0.0], [search.high]))
     assert found is not None
     return search.refined(found).peak / search.base
 
