@@ -32,7 +32,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.errors import SimulationError
 from softstart.optimal.demand import Demand
-from softstart.optimal.model import BETWEEN, CALM, LET_THROUGH, Model
+from softstart.optimal.model import BETWEEN, CALM, FARTHEST, LET_THROUGH, Model
 from softstart.optimal.problem import Objective, Problem
 from softstart.optimal.starts import DemandRun, DemandSimulator, steady_shaft_torques, wanted
 from softstart.profile import TorqueProfile
@@ -46,7 +46,7 @@ STEPS, TASTE = 60, 12
 ENDS = 257  # instants among which the end of a first demand is looked for
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
 REFUSED = 0.3  # by what a step that is refused narrows the trust region
-MISSED = 1e-5
+MISSED, MET = 1e-5, 1e-8  # share by which a condition is missed: near to it, and kept
 CORRECTED = 2  # Newton steps towards the terminal condition, before a step that misses it is refused
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
 IN_LAG = 0.04  # of a torque lag, between instants at which a curve limits the torque
@@ -81,6 +81,11 @@ class Found:
     @property
     def ends(self) -> bool:
         """Whether it is a start that keeps all conditions."""
+        return self.missed <= MET
+
+    @property
+    def near(self) -> bool:
+        """Whether it misses its conditions by no more than the smallest changes mend."""
         return self.missed <= MISSED
 
     @cached_property
@@ -228,11 +233,14 @@ class Descent:
             lacking = np.concatenate([lacking, np.where(open_too, 0.0, aim - T) / self.base])
         return lacking
 
-    def terminal_rows(self, found: Found) -> tuple[Matrix, Vector]:
-        """By how much each terminal quantity rises, as a share, with each unknown, and with t_f."""
+    def terminal_rows(self, found: Found, answers: Sequence[Matrix] = ()) -> tuple[Matrix, Vector]:
+        """By how much each terminal quantity rises, as a share, with each unknown, and with t_f.
+
+        `answers` are the derivatives of the state of each machine at t_f, if they are known.
+        """
         rows, rates, end = [], [], found.end
-        for player, start in zip(self.players, found.starts, strict=True):
-            answer = start.state_by_demand([end])[0]
+        answers = answers or [start.by_demand((), [end])[1][0] for start in found.starts]
+        for player, start, answer in zip(self.players, found.starts, answers, strict=True):
             joints, beside = player.joints, 1e-5 * player.period
             at = start.trajectory.at([end - beside, end, end + beside])
             w = answer[joints:-1] / player.target
@@ -276,16 +284,20 @@ class Descent:
     # descents ----------------------------------------------------------------------------------------------
 
     def down(
-        self, first: TorqueProfile | Found, steps: int = STEPS, least: float = 1e-4, dear: float = DEAREST
+        self,
+        first: TorqueProfile | Found | None,
+        steps: int = STEPS,
+        least: float = 1e-4,
+        dear: float = DEAREST,
     ) -> Found | None:
         """Down from a first demand, until a program promises less than the share `least`.
 
         Where a condition is missed after all steps, missing it costs more, up to `dear`.
         """
-        found = first if isinstance(first, Found) else self.play(self.onto(first))
+        found = self.play(self.onto(first)) if isinstance(first, TorqueProfile) else first
         penalty = PENALTY
         found = self._down(found, steps, least, penalty)
-        while found is not None and not found.ends and penalty < dear:
+        while found is not None and not found.near and penalty < dear:
             penalty *= 10.0
             found = self._down(found, steps, least, penalty)
         return found
@@ -312,7 +324,7 @@ class Descent:
                 end = min(found.end + later, self.latest)
                 tried = self.play(self.allowed(found.demand.changed(change)), end)
                 gained = -math.inf if tried is None else merit - tried.merit(penalty)
-                if tried is not None and gained <= ACCEPTED * promised and not tried.ends:
+                if tried is not None and gained <= ACCEPTED * promised and not tried.near:
                     nearer = self.finished(tried, rounds=CORRECTED)
                     if nearer is not None and nearer.merit(penalty) < tried.merit(penalty):
                         tried, gained = nearer, merit - nearer.merit(penalty)
@@ -392,7 +404,7 @@ class Descent:
         for _ in range(rounds):
             if found.lacking.max() <= (0.0 if reached else 1e-10):
                 return found
-            demand, rows = found.demand, self.terminal_rows(found)[0]
+            demand, (rows, rates) = found.demand, self.terminal_rows(found)
             missing = np.where(found.lacking > 0.0, found.missing + (reserve if reached else 0.0), 0.0)
             low = np.concatenate([self.low - demand.torque, np.zeros(demand.steps.size)]) / self.high
             high = np.concatenate([self.high - demand.torque, np.zeros(demand.steps.size)]) / self.high
@@ -401,8 +413,12 @@ class Descent:
                 low[demand.time.size :], high[demand.time.size :] = -earlier, later
             if self.starts_at_initial:
                 low[0] = high[0] = 0.0
-            change = least_change(rows, missing, low.clip(max=0.0), high.clip(min=0.0))
-            again = self.play(self.allowed(demand.changed(change)), found.end)
+            # where the time is minimised t_f may move too
+            moves = FARTHEST * found.end * (self.objective == "start_time")
+            longer = float(np.clip(self.latest - found.end, 0.0, moves))
+            low, high = np.append(low.clip(max=0.0), -moves), np.append(high.clip(min=0.0), longer)
+            room = least_change(np.column_stack([rows, rates]), missing, low, high)
+            again = self.play(self.allowed(demand.changed(room[:-1])), found.end + float(room[-1]))
             if again is None:
                 return None
             found = again

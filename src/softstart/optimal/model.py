@@ -41,6 +41,7 @@ from softstart.optimal.starts import DemandRun
 if TYPE_CHECKING:
     from softstart.optimal.descent import Descent, Found
 
+LOW = 0.6  # share of the peak from which rows are known at all
 NEAR, THIN = 0.85, 3  # share of the peak from which rows are in a program; one of so many of them
 ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of the decrease
 CLOSE = 0.25  # of the highest torque below the torque-speed curve: looked at
@@ -118,17 +119,18 @@ class Model:
     def __init__(self, search: Descent, found: Found) -> None:
         self.search, self.found = search, found
         problem, self.size = search.problem, found.demand.size
-        shafts, curve = [], []
+        shafts, curve, ends = [], [], []
+        limited = search.objective == "k_dyn" or problem.k_dyn is not None
         for player, start in zip(search.players, found.starts, strict=True):
-            times = start.with_peaks(start.instants(search.step))
-            state = start.trajectory.at(times)
-            if search.objective == "k_dyn" or problem.k_dyn is not None:
-                shafts.append(_of_shafts(search.base, start, times, state["T"]))
+            least = LOW * found.peak if limited else math.inf
+            shaft, end = _of_shafts(search, start, found.end, least)
+            shafts.append(shaft)
+            ends.append(end)
             if problem.torque_speed:
                 curve.append(self._of_curve(start, player.motor, player.joints))
         # largest torques as shares of the base torque; above the curve, as shares of the highest torque
         self.shafts, self.curve = Watched.of(shafts, self.size), Watched.of(curve, self.size)
-        self.terminal, rates = search.terminal_rows(found)
+        self.terminal, rates = search.terminal_rows(found, ends)
         self.rates = rates * found.end
         self.squares = tuple(self._squares())
         self.cuts = [np.zeros(self.size)]  # where squares have tangent planes
@@ -142,7 +144,7 @@ class Model:
         state = start.trajectory.at(times)
         w = state["w"][:, motor]
         near = np.flatnonzero(search.above(state["u"], w) > -CLOSE)
-        by = start.state_by_demand(times[near])
+        by = start.by_demand((), times[near])[1]
         parts = []
         for a, b in search.lines():
             over = (state["u"] - a - b * w)[near] / search.high + BETWEEN
@@ -158,7 +160,7 @@ class Model:
             start, Ms = found.starts[0], problem.starting_torque
             times, weights = start.quadrature(found.end)
             share = np.sqrt(weights) / Ms
-            by = start.state_by_demand(times)[:, -1] * share[:, None]
+            by = start.by_demand((), times)[1][:, -1] * share[:, None]
             last = float(start.trajectory.at([found.end])["u"][0]) / Ms
             cost = 1.0 / search.scale if search.objective == "heat" else 0.0
             u = start.trajectory.at(times)["u"] * share
@@ -304,16 +306,26 @@ class Model:
 
 
 def _of_shafts(
-    base: float, start: DemandRun, times: Vector, T: Matrix
-) -> tuple[Matrix, Vector, NDArray[np.bool_]]:
-    """|T| of each shaft over time where it presses, as shares of the base torque, and its rows."""
-    seen = np.flatnonzero(T.any(axis=1))
-    moved, slope = start.along_contacts(times)
-    answer = start.torques_by_demand(times[seen]) + slope[seen][:, :, None] * moved[seen][:, None, :]
+    search: Descent, start: DemandRun, t_f: float, least: float
+) -> tuple[tuple[Matrix, Vector, NDArray[np.bool_]], Matrix]:
+    """|T| of each shaft above `least` over time, as shares of the base torque, and its rows.
+
+    Also the derivatives of the state at t_f.
+    """
+    seen, T, times = np.zeros(0, dtype=np.intp), np.zeros((0, start.trajectory.input.count - 1)), np.zeros(0)
+    if math.isfinite(least):
+        times = start.with_peaks(start.instants(search.step))
+        T = start.trajectory.at(times)["T"]
+        seen = np.flatnonzero((np.abs(T) > least).any(axis=1))
+    begin = start.contacts[0]
+    marks = np.union1d(begin, [t_f])
+    answer, states = start.by_demand(times[seen], marks)
+    moved, slope = start.along_contacts(times[seen], states[np.searchsorted(marks, begin)])
+    answer = answer + slope[:, :, None] * moved[:, None, :]
     T = T[seen]
-    j, k = np.nonzero(T)
+    j, k = np.nonzero(np.abs(T) > least)
     order = np.lexsort((j, k))
     j, k = j[order], k[order]
-    rows = np.sign(T[j, k])[:, None] * answer[j, k] / base
+    rows = np.sign(T[j, k])[:, None] * answer[j, k] / search.base
     edges = np.append([True], (np.diff(k) != 0) | (np.diff(seen[j]) != 1))[: j.size]
-    return rows, np.abs(T[j, k]) / base, edges
+    return (rows, np.abs(T[j, k]) / search.base, edges), states[np.searchsorted(marks, t_f)]

@@ -15,10 +15,10 @@ from softstart.drive.limits import Limit
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.optimal import pulse_coast_hold
-from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time
+from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
 from softstart.optimal.check import check, replayed
 from softstart.optimal.descent import Descent, Found
-from softstart.optimal.path import Path
+from softstart.optimal.path import EDGE, Path
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
     Infeasibility,
@@ -38,6 +38,7 @@ from softstart.start.run import Run
 from softstart.start.simulation import simulate
 
 WITHIN = 1e-5  # of the start time, and of a limit that is met
+TIGHT = 1e-5  # a bound within this share needs no other one
 TINY = 1e-7  # of the start time: by so much longer than its bound the closed form is tried
 LONGEST = 100.0  # times the shortest start within the permissible torque: none longer is looked for
 SUCCESSIVE = "successive linear programs on the exact start"
@@ -224,6 +225,14 @@ def _checked(
     bound = momentum_bound(
         problem if problem.start_time else replace(problem, start_time=end, minimise="k_dyn", k_dyn=None)
     )
+    k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
+    if _certifiable(problem, method) and k_dyn > bound.k_dyn * (1.0 + TIGHT):
+        from softstart.optimal.certificate import certified_bound
+
+        closed = [event.time for event in runs[0].events if event.kind == "gap closed" and event.time < end]
+        if len(closed) <= 1:  # it covers these only
+            certified = certified_bound(problem, k_dyn, entry_near=runs[0].first_contact)
+            bound = max(bound, certified, key=lambda one: one.k_dyn)
     check(problem, profile, runs, end, claimed, bound)
     least = least_heat(problem) if problem.minimise == "heat" else 0.0
     seconds = time.perf_counter() - began
@@ -231,6 +240,15 @@ def _checked(
         problem, profile, runs, bound, method, why, claimed, end, seconds, heat_at_least=least,
         tried=(Trial(method, claimed, seconds, ""),),
     )  # fmt: skip
+
+
+def _certifiable(problem: Problem, method: Method) -> bool:
+    """Whether the certificate covers the problem: one drive with an ideal torque."""
+    from softstart.optimal.certificate import not_certified
+
+    alone = problem.minimise == "k_dyn" and problem.heat is None and len(problem.machines) == 1
+    pair = two_masses(problem.machines[0]) if alone and method != "closed-form" else None
+    return pair is problem.drive and problem.ideal_torque and not not_certified(problem)
 
 
 def _alone(problem: Problem, tell: Progress) -> dict[str, Optimum]:
@@ -357,7 +375,10 @@ def _shortest_within(problem: Problem, began: float) -> tuple[Optimum, float, Fo
         raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
     if problem.k_dyn is None or path.shortest.peak <= problem.k_dyn * problem.base_torque:
         best = _answer(
-            problem, path.gentlest(path.shortest), began, f"the shortest start found; {SUCCESSIVE}"
+            problem,
+            path.gentlest(path.shortest, path.shortest.end * (1.0 + EDGE)),
+            began,
+            f"the shortest start found; {SUCCESSIVE}",
         )
         return best, at_least, None
     found, quicker = path.quickest_within(problem.k_dyn)

@@ -2,8 +2,8 @@
 
 Near the shortest start time there are many local optima, each with its own contacts. One descent from the
 answer for the next start time keeps to those that it has: from above it keeps what is gentle, from below what
-is quick. So the starts are found on a fixed ladder of start times, from the shortest start up and from an
-easy long one down, and the better of both is kept. A start serves every longer time: K_dyn does not rise.
+is quick. So starts are found on the way from an easy long one down and from the shortest one up, always at
+the same times, and the better of both is kept. A start serves every longer time: K_dyn does not rise.
 Where K_dyn is at most 1 one search from first demands has the optimum in all cases known, and is enough.
 
 The shortest start is a descent on t_f. Its first demands are the quickest of many that switch between the
@@ -12,11 +12,11 @@ limits of the torque at random instants, by their exact starts.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,7 +37,15 @@ ROUGHLY = 0.3  # what is missed, beside the time, in the order of first demands
 FIRSTS = 3  # demands that a search begins with
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 CLOSE = 1.05  # latest time, by the shortest start found: there it is refined
-RUNGS, SPREAD = 12, 0.005  # of the ladder: shortest time * (1 + spread * (2^k - 1))
+RUNGS, SPREAD = 9, 0.005  # of the way up: at the shortest time * (1 + spread * (2^k - 1))
+WIDE, FINE, NARROW = (
+    0.1,
+    0.025,
+    1e-3,
+)  # of the start time: steps down at K_dyn up to 1, above it, the least one
+MUCH = 4.0  # times the first long start: no longer one is looked for that is easier
+LEFT = 3  # nodes at which the way down is better in succession: then the way up is left
+MILD = 1.15  # K_dyn up to which the way down is enough
 ROUGH = 3e-4  # of K_dyn: how exactly the rungs are found
 BEND = 1e-3  # of the largest torque: what is kept of the knots of a neighbour
 TRIES = 1500  # knots in all starts around one, where one torque serves several machines
@@ -47,6 +55,13 @@ MET = 3e-6  # of a bound on K_dyn, that is left to it
 EDGE = 1e-6  # of the start time: so much longer than the shortest start
 
 
+class Node(NamedTuple):
+    """A start that is known within a time, s."""
+
+    latest: float
+    found: Found
+
+
 class Path:
     """The starts of a problem at all start times; its own start time does not matter."""
 
@@ -54,8 +69,6 @@ class Path:
         self.problem, self.tell = problem, tell
         self.players = tuple(map(DemandSimulator, problem.machines))
         self.period = max(player.period for player in self.players)
-        self._up: list[Found] = []
-        self._down: dict[int, Found] = {}
 
     def descent(self, latest: float, objective: Objective | None = None) -> Descent:
         """The descents within a start time."""
@@ -83,20 +96,23 @@ class Path:
         if full is None:
             return None
         span = min(1.2 * full.end, latest)
-        firsts = [TorqueProfile([0.0], [search.high]), *seeds.switching(search, span, SAMPLES)]
-        return self.quickest(search, firsts)
+        switching = [TorqueProfile([0.0], [search.high]), *seeds.switching(search, span, SAMPLES)]
+        return self.quickest(search, switching, self.gentle_firsts(search))
 
-    def quickest(self, search: Descent, firsts: Iterable[TorqueProfile]) -> Found | None:
-        """The shortest start by descents from the best of first demands."""
-        played = [search.play(search.onto(one)) for one in firsts]
+    def quickest(
+        self, search: Descent, many: Iterable[TorqueProfile], more: Iterable[TorqueProfile]
+    ) -> Found | None:
+        """The shortest start by descents from the best of many first demands, and from more."""
+        easier = search
+        if self.problem.terminal == "steady":  # the torque that is asked for at the end misleads at first
+            easier = Descent(replace(self.problem, terminal="synchronous"), search.latest, "start_time")
+        played = [easier.play(easier.onto(one)) for one in many]
         near = sorted((one for one in played if one), key=lambda one: one.merit(ROUGHLY))[:FOLLOWED]
-        after = [one for each in near if (one := search.step_down(each)) is not None]
+        after = [one for each in near if (one := easier.step_down(each)) is not None]
         after.sort(key=Found.merit)
-        ended = []
-        for one in after[:FINISHED]:
-            down = search.down(one)
-            down = down and search.finished(down)
-            ended += [down] if down and down.ends else []
+        firsts = [search.play(one.demand, one.end) for one in after[:FINISHED]]
+        firsts += [search.play(search.onto(one)) for one in more]
+        ended = [one for each in firsts if (one := self._ended(search.down(each), search))]
         if not ended:
             return None
         best = min(ended, key=lambda one: one.end)
@@ -109,13 +125,16 @@ class Path:
 
     def searched(self, search: Descent) -> Found | None:
         """The best start by descents from first demands: closed forms and pulses."""
-        firsts = seeds.pulse_coast_level(search)[:FIRSTS]
-        formulas = [seeds.pulse_coast_hold(search, player) for player in search.players]
-        firsts += [one for one in formulas if one is not None]
+        firsts = self.gentle_firsts(search)
         after = [one for each in firsts if (one := search.step_down(search.play(search.onto(each))))]
         after.sort(key=Found.merit)
-        ended = [down for one in after[:2] if (down := search.down(one, least=ROUGH)) and down.ends]
+        ended = [down for one in after[:2] if (down := search.down(one, least=ROUGH)) and down.near]
         return min(ended, key=Found.merit, default=None)
+
+    def gentle_firsts(self, search: Descent) -> list[TorqueProfile]:
+        """First demands of gentle starts: closed forms and pulses."""
+        formulas = [seeds.pulse_coast_hold(search, player) for player in search.players]
+        return [*seeds.pulse_coast_level(search)[:FIRSTS], *[one for one in formulas if one is not None]]
 
     def followed(self, search: Descent, *neighbours: Found | None) -> Found | None:
         """The best of one descent from the demand of each neighbour, as it is or scaled in time."""
@@ -137,7 +156,7 @@ class Path:
 
     def easy(self, found: Found | None) -> bool:
         """Whether a start is one whose optimum a single search has."""
-        if found is None or not found.ends:
+        if found is None or not found.near:
             return False
         one = len(self.players) == 1
         return one and (self.problem.minimise == "heat" or found.peak <= self.problem.drive.mean_torque)
@@ -148,13 +167,17 @@ class Path:
         ended = [] if near is None else [self._ended(search.down(near, least=ROUGH), search)]
         ended += [self.searched(search)] if len(self.players) == 1 else []
         if not any(self.easy(one) for one in ended):
-            shortest = self.shortest
-            if shortest is not None and shortest.end <= latest <= shortest.end * (1.0 + EDGE):
-                return self.gentlest(shortest)
-            if shortest is not None and shortest.end < latest:
-                number = int(math.log2((latest / shortest.end - 1.0) / SPREAD + 1.0))
-                below = self.rung(min(number, RUNGS - 1))
-                ended.append(self.followed(search, below, self._down.get(number + 1)))
+            nodes = self._gentle
+            gentle = next((one.found for one in nodes if one.latest <= latest), None)
+            mild = MILD * float(self.problem.drive.mean_torque)
+            if gentle is None or len(self.players) > 1 or gentle.peak > mild:
+                nodes = self._nodes
+            if self.shortest is not None and self.shortest.end <= latest <= self.shortest.end * (1.0 + EDGE):
+                return self.gentlest(self.shortest, latest)
+            below = next((one.found for one in nodes if one.latest <= latest), None)
+            above = next((one.found for one in reversed(nodes) if one.latest > latest), None)
+            ended.append(self.followed(search, below, above))
+            if below is not None:
                 ended.append(self._ended(search.play(search.onto(below.profile), below.end), search))
         best = min((one for one in ended if one), key=Found.merit, default=None)
         return None if best is None else self.first(search, self.polished(search, best))
@@ -170,9 +193,9 @@ class Path:
         sooner = search.play(found.demand, search.first_end(found.starts))
         return sooner if sooner is not None and sooner.ends and sooner.end <= found.end else found
 
-    def gentlest(self, shortest: Found) -> Found:
-        """The gentlest start found in the time of the shortest one."""
-        search = self.descent(shortest.end * (1.0 + EDGE))
+    def gentlest(self, shortest: Found, latest: float) -> Found:
+        """The gentlest start found in the time of the shortest one, or a little more."""
+        search = self.descent(latest)
         found = self._ended(search.down(shortest.profile, least=ROUGH), search)
         best = shortest if found is None or found.peak > shortest.peak else found
         return self.first(search, best) or best
@@ -181,20 +204,17 @@ class Path:
         """The shortest start found with at most this K_dyn, and the last on the ladder that exceeds it."""
         most = k_dyn * self.problem.base_torque
         limited = replace(self.problem, minimise="start_time", start_time=None, k_dyn=k_dyn * (1.0 - MET))
-        longest = LONGEST * self.period + 10.0 * self._time(0)
-        for number in itertools.count(1):
-            rung = self.rung(number)
-            if rung.peak > most:
-                if self._time(number) > longest:
-                    break
-                continue
-            search = Descent(limited, self._time(number), "start_time", self.players)
-            known = [rung, self._down.get(number), self.rung(number - 1), self._down.get(number - 1)]
-            downs = [search.down(one.profile.simplified(BEND), least=ROUGH) for one in known if one]
-            ended = [one for each in downs if (one := self._ended(each and search.refined(each), search))]
-            kept = [one for one in ended if one.peak <= most]
-            return min(kept, key=lambda one: one.end, default=rung), self.rung(number - 1)
-        return None, rung
+        nodes = self._nodes
+        first = next((k for k in reversed(range(len(nodes))) if nodes[k].found.peak <= most), None)
+        if first is None:
+            return None, min((one.found for one in nodes), key=lambda one: one.peak)
+        quicker = nodes[min(first + 1, len(nodes) - 1)].found
+        search = Descent(limited, nodes[first].latest, "start_time", self.players)
+        known = [nodes[first].found, quicker]
+        downs = [search.down(one.profile.simplified(BEND), least=ROUGH) for one in known]
+        ended = [one for each in downs if (one := self._ended(each and search.refined(each), search))]
+        kept = [one for one in ended if one.peak <= most]
+        return min(kept, key=lambda one: one.end, default=nodes[first].found), quicker
 
     def polished(self, search: Descent, found: Found) -> Found | None:
         """The same on finer grids, with the terminal condition met to rounding."""
@@ -203,67 +223,73 @@ class Path:
         ended = [one for one in (fine, rough) if one is not None and one.ends]
         return min(ended, key=Found.merit, default=None)
 
-    # the ladder --------------------------------------------------------------------------------------------
+    # nodes: the starts known at other times -----------------------------------------------------------------
 
-    def rung(self, number: int) -> Found:
-        """The better of both ways on a rung of the ladder, and all rungs below it."""
-        assert self.shortest is not None
-        if not self._up:
-            self._climb(number)
-        while len(self._up) <= number:  # a search is enough there
-            last = self._up[-1]
-            found = self.searched(self.descent(self._time(len(self._up))))
-            self._up.append(self._better(len(self._up), last, found))
-        return self._up[number]
-
-    def _time(self, number: int) -> float:
-        assert self.shortest is not None
-        return self.shortest.end * (1.0 + SPREAD * (2.0**number - 1.0))
-
-    def _better(self, number: int, *neighbours: Found | None) -> Found:
-        """The best start on a rung, by its neighbours, the first of which serves it as it is."""
-        found = self.followed(self.descent(self._time(number)), *neighbours)
-        known = [one for one in (found, neighbours[0]) if one is not None]
-        return min(known, key=lambda one: one.peak if self.problem.minimise != "heat" else one.heat)
-
-    def _climb(self, number: int) -> None:
-        """Up until a search is enough, down from there, and up again."""
-        assert self.shortest is not None
-        up = [self.shortest]
-        while len(up) < RUNGS and not (len(up) > number + 1 and self._calm(up[-1])):
-            self.tell(f"start time {self._time(len(up)):.4g} s")
-            up.append(self._better(len(up), up[-1]))
-        top = len(up) - 1
-        search = self.descent(self._time(top))
-        down = min(
-            (one for one in (up[top], self._long_end(search, up[top])) if one), key=lambda one: one.peak
-        )
-        self._down = {top: down}
-        for rung in range(top - 1, 0, -1):
-            self.tell(f"start time {self._time(rung):.4g} s")
-            found = self.followed(self.descent(self._time(rung)), down)
-            if found is None:
+    @cached_property
+    def _gentle(self) -> list[Node]:
+        """From an easy long start down in time, until none follows; long times first."""
+        least = max(momentum_shortest_time(self.problem), rigid_start_time(self.problem))
+        latest, first = 1.5 * least + 2.0 * self.period, None
+        while latest < LONGEST * (least + self.period):
+            search = self.descent(latest)
+            found = self.searched(search)
+            if found is not None and (first is None or found.peak < first.found.peak):
+                first = Node(latest, found)
+            if (first is not None and self._calm(first.found)) or (first and latest > MUCH * first.latest):
                 break
-            self._down[rung] = down = found
-        self._up = [self.shortest]
-        for rung in range(1, top + 1):
-            one, other = up[rung], self._down.get(rung)
-            best = one if other is None or one.peak <= other.peak else other
-            if self._up[-1].peak < up[rung - 1].peak:  # it came from above: what it leads to
-                best = min(best, self._better(rung, self._up[-1]), key=lambda one: one.peak)
-            self._up.append(best)
+            latest *= 1.3
+        if first is None:
+            return []
+        nodes = [self._widened(first)]
+        step, large = WIDE, WIDE
+        while step > NARROW:
+            latest, last = nodes[-1].latest * (1.0 - step), nodes[-1].found
+            self.tell(f"start time {latest:.4g} s")
+            found = self.followed(self.descent(latest), last)
+            large = WIDE if self._calm(last) else FINE
+            if found is None:
+                step *= 0.4
+            else:
+                nodes.append(Node(latest, found))
+                step = min(2.0 * step, large)
+        return nodes
+
+    @cached_property
+    def _nodes(self) -> list[Node]:
+        """Also from the shortest start up, the better of both at each time; long times first."""
+        gentle = self._gentle
+        if self.shortest is None:
+            return gentle
+        begin = self.shortest.end
+        ladder = [begin * (1.0 + SPREAD * (2.0**k - 1.0)) for k in range(1, RUNGS)]
+        until = gentle[-1].latest if gentle else math.inf
+        times = sorted([*[t for t in ladder if t < until * 0.999], *[one.latest for one in gentle]])
+        known = {one.latest: one.found for one in gentle}
+        nodes, worse = [Node(begin, self.shortest)], 0
+        for latest in times:
+            if latest < begin:
+                continue
+            last, own = nodes[-1].found, known.get(latest)
+            found = None
+            if worse < LEFT:  # the quick starts have been the harder ones for so long
+                self.tell(f"start time {latest:.4g} s")
+                found = self.followed(self.descent(latest), last)
+            best = min((one for one in (found, own, last) if one), key=self._figure)
+            worse = worse + 1 if best is own else 0
+            nodes.append(Node(latest, best))
+        return nodes[::-1]
+
+    def _figure(self, found: Found) -> float:
+        return found.heat if self.problem.minimise == "heat" else found.peak
 
     def _calm(self, found: Found) -> bool:
         return found.peak <= self.problem.drive.mean_torque
 
-    def _long_end(self, search: Descent, known: Found) -> Found | None:
-        """The best start at a long time, where one torque serves several machines by a wider search."""
-        found = self.searched(search)
+    def _widened(self, first: Node) -> Node:
+        """The same, or a better one by a wider search where one torque serves several machines."""
         if len(self.players) == 1:
-            return found
-        ended = [one for one in (found, search.down(known.profile.simplified(BEND))) if one and one.ends]
-        best = min(ended, key=Found.merit, default=None)
-        return best and self.around(search, best)
+            return first
+        return Node(first.latest, self.around(self.descent(first.latest), first.found))
 
     def around(self, search: Descent, found: Found) -> Found:
         """The best of local optima around one: its demand stretched in time, or with bumps, and down again.
@@ -285,6 +311,6 @@ class Path:
             down = search.step_down(search.play(search.onto(demand)))
             if down is not None and down.merit() < HOPEFUL * found.merit():
                 down = search.down(down, least=1e-3)
-            if down is not None and down.ends and down.merit() < found.merit():
+            if down is not None and down.near and down.merit() < found.merit():
                 found = down
         return found

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
-from softstart.arrays import Matrix, Vector
+from softstart.arrays import Indices, Matrix, Vector
 from softstart.controller import make_controller
 from softstart.drive.machine import Machine
 from softstart.kernel import records as rec
@@ -19,6 +20,8 @@ from softstart.start.engine import ended, run_one
 from softstart.start.kernel_input import MAX_EVENTS, KernelInput, kernel_input
 from softstart.start.trajectory import StartRecorder, Trajectory
 
+Rows = NDArray[np.float64]  # for each instant a matrix
+
 
 @dataclass(frozen=True, eq=False)
 class DemandRun:
@@ -26,9 +29,7 @@ class DemandRun:
 
     profile: TorqueProfile
     trajectory: Trajectory
-    weights: Matrix | float = (
-        1.0  # of the torques at the knots, N m, for a unit of each unknown of the demand
-    )
+    weights: Matrix | float = 1.0  # torques at the knots, N m, for a unit of each unknown of the demand
 
     @property
     def peak(self) -> float:
@@ -65,46 +66,46 @@ class DemandRun:
         times = start[:, None] + half * (nodes + 1.0)
         return times[inside].ravel(), (half * weights)[inside].ravel()
 
-    def torques_by_demand(self, times: ArrayLike) -> NDArray[np.float64]:
-        """dT_k(times[j])/dx_q of the unknowns x of the demand as [j, k, q]."""
-        found = self.trajectory.sensitivities(self.profile.time, times)[0]
-        return self._of_unknowns(found)
+    def by_demand(self, times: ArrayLike, marks: ArrayLike) -> tuple[Rows, Rows]:
+        """How the start answers to the unknowns x of the demand: dT_k(times[j])/dx_q as [j, k, q], and
 
-    def along_contacts(self, times: Vector) -> tuple[Matrix, Matrix]:
-        """How instants move that keep their place between the contacts, and dT_k/dt there.
-
-        A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/dx = -(dtheta_k/dx)/theta_k'; in
-        between the shift is interpolated, and it is none at both ends. Shapes (j, q) per unknown and (j, k).
+        the derivatives of twists, speeds and realised torque at `marks` as [j, part, q]; both rise.
         """
+        by = self.weights
+        torques, states = self.trajectory.sensitivities(self.profile.time, times, marks)
+        return (torques * by, states * by) if isinstance(by, float) else (torques @ by, states @ by)
+
+    @cached_property
+    def contacts(self) -> tuple[Vector, Indices, Vector]:
+        """When gaps close, s, of which shafts, and how fast, rad/s; without soft ones, which move too far."""
         trajectory = self.trajectory
         events = trajectory.events[trajectory.events["kind"] == rec.CLOSED]
-        events = events[(events["time"] > 0.0) & (events["time"] < times[-1])]
-        count = self.profile.time.size if isinstance(self.weights, float) else self.weights.shape[1]
-        moved = np.zeros((times.size, count))
-        if events.size:
-            shafts = events["place"].astype(int)
-            when = trajectory.at(events["time"])["w"]
-            v = when[np.arange(shafts.size), shafts] - when[np.arange(shafts.size), shafts + 1]
-            hard = np.abs(v) > 1e-4 * float(np.abs(when).max())  # a softer contact moves too far
-            begin, shafts, v = np.ascontiguousarray(events["time"][hard]), shafts[hard], v[hard]
-            shift = -self.state_by_demand(begin)[np.arange(shafts.size), shafts] / v[:, None]
-            begin, kept = np.unique(begin, return_index=True)
-            none, knots = np.zeros((1, moved.shape[1])), np.concatenate([[0.0], begin, [times[-1]]])
-            moved = make_interp_spline(knots, np.concatenate([none, shift[kept], none]), k=1)(times)
-        inside = trajectory.index(times)
+        events = events[(events["time"] > 0.0) & (events["time"] < trajectory.spans[-1, rec.S_END])]
+        shafts = events["place"].astype(int)
+        when = trajectory.at(events["time"])["w"]
+        v = when[np.arange(shafts.size), shafts] - when[np.arange(shafts.size), shafts + 1]
+        hard = np.abs(v) > 1e-4 * float(np.abs(when).max(initial=0.0))
+        begin, kept = np.unique(np.ascontiguousarray(events["time"][hard]), return_index=True)
+        return begin, shafts[hard][kept], v[hard][kept]
+
+    def along_contacts(self, times: Vector, states: Rows) -> tuple[Matrix, Matrix]:
+        """How instants move that keep their place between the contacts, and dT_k/dt there.
+
+        A contact of shaft k at t_c, theta_k(t_c) on its flank, moves by dt_c/dx = -(dtheta_k/dx)/theta_k', by
+        the derivatives of the states at `contacts`; in between the shift is interpolated, and it is none at
+        both ends. Shapes (j, q) per unknown and (j, k).
+        """
+        begin, shafts, v = self.contacts
+        moved = np.zeros((times.size, states.shape[2]))
+        if begin.size and times.size:
+            shift = -states[np.arange(shafts.size), shafts] / v[:, None]
+            none, end = np.zeros((1, moved.shape[1])), self.trajectory.spans[-1, rec.S_END]
+            knots = np.concatenate([[0.0], begin, [end]])
+            moved = make_interp_spline(knots, np.concatenate([none, shift, none]), k=1)(times)
+        inside = self.trajectory.index(times)
         step = 1e-6 * float(self.profile.time[-1])
-        after, before = (trajectory.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
+        after, before = (self.trajectory.at(times + sign * step, inside)["T"] for sign in (1.0, -1.0))
         return moved, (after - before) / (2.0 * step)
-
-    def state_by_demand(self, marks: ArrayLike) -> NDArray[np.float64]:
-        """Of twists, speeds and realised torque at rising marks: the derivatives as [j, part, q]."""
-        found = self.trajectory.sensitivities(self.profile.time, (), marks)[1]
-        return self._of_unknowns(found)
-
-    def _of_unknowns(self, found: NDArray[np.float64]) -> NDArray[np.float64]:
-        by = self.weights
-        whole: NDArray[np.float64] = found * by if isinstance(by, float) else found @ by
-        return whole
 
 
 class DemandSimulator:

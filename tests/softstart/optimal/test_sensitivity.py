@@ -44,9 +44,10 @@ def off(
     known = np.append(trajectory.events["time"], profile.time)
     instants = instants[np.abs(instants[:, None] - known[None, :]).min(axis=1) > 1e-4 * until]
     measured = slopes(player, profile, direction, until, instants)
-    states, joints = played.state_by_demand(instants) @ direction, player.joints
+    torques, states = (answer @ direction for answer in played.by_demand(instants, instants))
+    joints = player.joints
     exact = {
-        "T": played.torques_by_demand(instants) @ direction,
+        "T": torques,
         "twist": states[:, :joints],
         "w": states[:, joints:-1],
         "u": states[:, -1:],
@@ -126,7 +127,9 @@ def test_instants_move_with_the_contacts() -> None:
         ends = [contacts(player.play(moved(profile, direction, sign * STEP), until)) for sign in (1.0, -1.0)]
         if not begin.size or {one.size for one in ends} != {begin.size}:
             continue
-        shift, _ = played.along_contacts(np.append(begin["time"], until))
+        shift, _ = played.along_contacts(
+            np.append(begin["time"], until), played.by_demand((), played.contacts[0])[1]
+        )
         assert not shift[-1].any()
         exact, measured = shift[:-1] @ direction, (ends[0]["time"] - ends[1]["time"]) / (2.0 * STEP)
         speeds = played.trajectory.at(begin["time"])["w"]
