@@ -32,7 +32,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.errors import SimulationError
 from softstart.optimal.demand import Demand
-from softstart.optimal.model import BETWEEN, CALM, FARTHEST, LET_THROUGH, Model
+from softstart.optimal.model import BETWEEN, CALM, LET_THROUGH, Model
 from softstart.optimal.problem import Objective, Problem
 from softstart.optimal.starts import DemandRun, DemandSimulator, steady_shaft_torques, wanted
 from softstart.profile import TorqueProfile
@@ -51,6 +51,7 @@ CORRECTED = 2  # Newton steps towards the terminal condition, before a step that
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
 IN_LAG = 0.04  # of a torque lag, between instants at which a curve limits the torque
 JUMP, HALVED = 0.04, 32  # bend of the torque, in highest torques, beside which intervals are halved; so many
+STALLED = 3e-4  # of the merit: a gain on a finer grid after which a descent goes on
 SWITCH, LEVEL = 0.25, 0.02  # change of the torque, in highest torques, that becomes a step between two levels
 
 
@@ -324,7 +325,10 @@ class Descent:
                 end = min(found.end + later, self.latest)
                 tried = self.play(self.allowed(found.demand.changed(change)), end)
                 gained = -math.inf if tried is None else merit - tried.merit(penalty)
-                if tried is not None and gained <= ACCEPTED * promised and not tried.near:
+                if (
+                    tried is not None
+                    and gained <= ACCEPTED * promised < tried.merit(penalty) - tried.objective
+                ):
                     nearer = self.finished(tried, rounds=CORRECTED)
                     if nearer is not None and nearer.merit(penalty) < tried.merit(penalty):
                         tried, gained = nearer, merit - nearer.merit(penalty)
@@ -352,6 +356,8 @@ class Descent:
             found = down if gained > 0.0 else found
             if gained < least * found.merit() and number > 0:
                 break
+            if gained > STALLED * found.merit():  # far from its end: from a wide trust region again
+                found = self._down(found, STEPS // 2, least, PENALTY) or found
         return found
 
     def _halved(self, demand: Demand) -> Demand | None:
@@ -414,7 +420,7 @@ class Descent:
             if self.starts_at_initial:
                 low[0] = high[0] = 0.0
             # where the time is minimised t_f may move too
-            moves = FARTHEST * found.end * (self.objective == "start_time")
+            moves = 0.1 * self.period * (self.objective == "start_time")
             longer = float(np.clip(self.latest - found.end, 0.0, moves))
             low, high = np.append(low.clip(max=0.0), -moves), np.append(high.clip(min=0.0), longer)
             room = least_change(np.column_stack([rows, rates]), missing, low, high)

@@ -47,7 +47,7 @@ ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of t
 CLOSE = 0.25  # of the highest torque below the torque-speed curve: looked at
 BETWEEN = 5e-5  # of the highest torque: kept from the curve for what happens between the instants
 CURVE_TOLERANCE = 1e-4  # of a step, by which the torque may lie beyond the curve in a program
-FARTHEST = 0.2  # of t_f, that it moves in a step
+FARTHEST, TURNS = 1.0, 0.5  # of t_f and of the elastic period, that t_f moves for a unit of trust
 CALM = 1e-5  # weight of the total variation of the torque, in highest torques
 STEP = 4.0  # units of time that a step may move for each unit of trust
 
@@ -246,7 +246,7 @@ class Model:
             earlier, later = found.demand.room()
             lower[knots:n] = -np.minimum(earlier, STEP * trust)
             upper[knots:n] = np.minimum(later, STEP * trust)
-        lower[n + 1] = -min(trust, FARTHEST)
+        lower[n + 1] = -trust * min(FARTHEST, TURNS * search.period / found.end)
         upper[n + 1] = max(min(-lower[n + 1], search.latest / found.end - 1.0), 0.0)
         self.program.limit(lower, upper)
         x = self._solved(self.program, fine)

@@ -38,14 +38,12 @@ FIRSTS = 3  # demands that a search begins with
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 CLOSE = 1.05  # latest time, by the shortest start found: there it is refined
 RUNGS, SPREAD = 9, 0.005  # of the way up: at the shortest time * (1 + spread * (2^k - 1))
-WIDE, FINE, NARROW = (
-    0.1,
-    0.025,
-    1e-3,
-)  # of the start time: steps down at K_dyn up to 1, above it, the least one
-MUCH = 4.0  # times the first long start: no longer one is looked for that is easier
+LONG = 1.0, 1.4, 2.0, 3.0  # times a usual start: where an easy one is looked for
+WIDE, NARROW, RISE = 0.1, 1e-3, 0.08  # of the start time: steps down; the rise of K_dyn that is aimed at
 LEFT = 3  # nodes at which the way down is better in succession: then the way up is left
+BEST, ALIKE = 2, 1.01  # starts that are refined, if they are so near to the best one
 MILD = 1.15  # K_dyn up to which the way down is enough
+FOLLOWS, DEAR = 30, 2e3  # steps from a neighbour, and the penalty up to which they are tried again
 ROUGH = 3e-4  # of K_dyn: how exactly the rungs are found
 BEND = 1e-3  # of the largest torque: what is kept of the knots of a neighbour
 TRIES = 1500  # knots in all starts around one, where one torque serves several machines
@@ -80,6 +78,16 @@ class Path:
     @cached_property
     def shortest(self) -> Found | None:
         """The shortest start that was found within the bounds of the problem, whatever else it has."""
+        found = [self._quickest]
+        if self._gentle:
+            last = self._gentle[-1]
+            search = self.descent(last.latest, "start_time")
+            found += [last.found, self._ended(search.down(last.found.profile, least=ROUGH), search)]
+        return min((one for one in found if one), key=lambda one: one.end, default=None)
+
+    @cached_property
+    def _quickest(self) -> Found | None:
+        """The shortest start by descents on t_f."""
         least = max(momentum_shortest_time(self.problem), rigid_start_time(self.problem))
         latest = 1.5 * least + 2.0 * self.period
         longest = LONGEST * (least + self.period)
@@ -147,9 +155,8 @@ class Path:
             played = [start for each in (known, scaled) if (start := search.play(search.onto(each)))]
             played.sort(key=Found.merit)
             for start in played:
-                down = search.down(start, least=ROUGH)
-                down = down and search.finished(down)
-                if down is not None and down.ends:
+                down = self._ended(search.down(start, FOLLOWS, ROUGH, DEAR), search)
+                if down is not None:
                     ended.append(down)
                     break
         return min(ended, key=Found.merit, default=None)
@@ -176,11 +183,16 @@ class Path:
                 return self.gentlest(self.shortest, latest)
             below = next((one.found for one in nodes if one.latest <= latest), None)
             above = next((one.found for one in reversed(nodes) if one.latest > latest), None)
-            ended.append(self.followed(search, below, above))
-            if below is not None:
-                ended.append(self._ended(search.play(search.onto(below.profile), below.end), search))
-        best = min((one for one in ended if one), key=Found.merit, default=None)
-        return None if best is None else self.first(search, self.polished(search, best))
+            ended += [self.followed(search, below, above), below]
+        best = sorted((one for one in ended if one), key=self._figure)
+        polished = list[Found]()
+        for one in best:
+            if polished and (len(polished) == BEST or self._figure(one) > ALIKE * self._figure(polished[0])):
+                break
+            fine = self.polished(search, one)
+            polished += [] if fine is None else [fine]
+        found = min(polished, key=self._figure, default=None)
+        return None if found is None else self.first(search, found)
 
     def _ended(self, found: Found | None, search: Descent) -> Found | None:
         found = found and search.finished(found)
@@ -218,10 +230,9 @@ class Path:
 
     def polished(self, search: Descent, found: Found) -> Found | None:
         """The same on finer grids, with the terminal condition met to rounding."""
-        fine = search.finished(search.refined(found))
-        rough = search.finished(found)
-        ended = [one for one in (fine, rough) if one is not None and one.ends]
-        return min(ended, key=Found.merit, default=None)
+        start = search.play(found.demand, found.end)
+        ended = [found, self._ended(start and search.refined(start), search), self._ended(start, search)]
+        return min((one for one in ended if one and one.ends), key=self._figure, default=None)
 
     # nodes: the starts known at other times -----------------------------------------------------------------
 
@@ -229,29 +240,28 @@ class Path:
     def _gentle(self) -> list[Node]:
         """From an easy long start down in time, until none follows; long times first."""
         least = max(momentum_shortest_time(self.problem), rigid_start_time(self.problem))
-        latest, first = 1.5 * least + 2.0 * self.period, None
-        while latest < LONGEST * (least + self.period):
-            search = self.descent(latest)
-            found = self.searched(search)
-            if found is not None and (first is None or found.peak < first.found.peak):
+        first = None
+        for share in LONG:
+            latest = share * (1.5 * least + 2.0 * self.period)
+            found = self.searched(self.descent(latest))
+            first = Node(latest, found) if found is not None and first is None else first
+            if found is not None and self._calm(found):
                 first = Node(latest, found)
-            if (first is not None and self._calm(first.found)) or (first and latest > MUCH * first.latest):
                 break
-            latest *= 1.3
         if first is None:
             return []
-        nodes = [self._widened(first)]
-        step, large = WIDE, WIDE
+        nodes, step = [self._widened(first)], WIDE
         while step > NARROW:
             latest, last = nodes[-1].latest * (1.0 - step), nodes[-1].found
             self.tell(f"start time {latest:.4g} s")
-            found = self.followed(self.descent(latest), last)
-            large = WIDE if self._calm(last) else FINE
+            search = self.descent(latest)
+            found = self.followed(search, last) or self.followed(search, *[one.found for one in nodes[-4:-1]])
             if found is None:
                 step *= 0.4
-            else:
-                nodes.append(Node(latest, found))
-                step = min(2.0 * step, large)
+                continue
+            nodes.append(Node(latest, found))
+            rise = max(math.log(self._figure(found) / self._figure(last)), 1e-9)
+            step = min(step * min(max(RISE / rise, 0.5), 2.0), WIDE)
         return nodes
 
     @cached_property
