@@ -18,7 +18,7 @@ from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
 Method = Literal["closed-form", "descent", "collocation"]
-BoundKind = Literal["certificate", "momentum", "none"]
+BoundKind = Literal["certificate", "duality", "momentum", "none"]
 BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left
 
 
