@@ -33,7 +33,6 @@ from softstart.optimal.duality_program import (
     DEMAND,
     MEAN,
     RAMPED,
-    ROUNDING,
     RUB,
     W1,
     W2,
@@ -176,8 +175,7 @@ class _Search:
 
     def __init__(self, problem: Problem, machine: Drive, k_dyn: float) -> None:
         self.model = m = Model(problem, machine)
-        assert problem.start_time is not None
-        self.end = problem.start_time * m.Omega * (1.0 + ROUNDING)
+        self.end = m.end
         self.goal = k_dyn * problem.base_torque / m.Ms * (1.0 - WITHIN)
         self.times, self.speeds, self.first = self.in_the_gap()
         # what the load loses until the closing, as torque
@@ -238,7 +236,7 @@ class _Search:
             x = step.E @ x + step.fixed + step.G @ p
             most = max(most, float(m.T @ x))
             found.append(most)
-        return np.maximum(np.array(found) - m.mc - m.W / (m.mu2 * self.end), 0.0)
+        return np.maximum(np.array(found) - m.least, 0.0)
 
     def speed(self, t: float) -> float:
         """Largest z' in the open gap until t."""
@@ -361,16 +359,18 @@ class _Instants:
 
     def __init__(self, search: _Search, box: Box) -> None:
         far, m = -box.start[1], search.model
-        spans = [(-span[1], -span[0]) if span else None for span in (box.close, box.move, box.part)]
+        every = box.close, box.move, box.part
+        spans = [(-span[1], -span[0]) if span else None for span in every]
         (self.c0, self.c1), (self.s0, self.s1) = (one or (far, far) for one in spans[:2])
         self.o0, self.o1 = spans[2] or (math.inf, math.inf)
         self.tail = 0.0 if box.part else search.tail
         self.speed = search.speed(self.c1 + box.start[1]) if box.close else 0.0
         self.most = self.speed * (self.c1 - self.c0 + m.d)  # T until all have closed
         # z' is not below 0 so soon after a closing
-        self.rises = m.pushed and self.c1 - self.c0 <= 0.5 * m.half
+        self.rises = self.c1 - self.c0 <= 0.5 * m.half
         self.begin = self.c0 if box.again else self.s0
-        marks = {t for t in (self.c0, self.c1, self.s0, self.s1, self.o0) if far < t < 0.0}
+        instants = self.c0, self.c1, self.s0, self.s1, self.o0
+        marks = {t for t in instants if far < t < 0.0}
         self.marks, self.far = {far, 0.0, self.tail} | marks, far
 
     def phase(self, t: float, moves: bool) -> Phase:
@@ -393,7 +393,7 @@ def layout(search: _Search, box: Box, begin: float) -> Layout:
             one = phase._replace(length=h)
             if phase.shaft == "free":
                 # T cannot rise more quickly after an opening, as z' is limited
-                rise = m.quickest * (t - at.o0 + m.d) if m.pushed else 1.0
+                rise = m.quickest * (t - at.o0 + m.d)
                 late = -1.0 if at.o0 >= at.c1 else at.most
                 one = one._replace(most=min(1.0, rise), joins=joins, begin=late if joins else -1.0)
                 joins = False
@@ -465,7 +465,7 @@ def _limits(m: Model, cell: Phase, node: int) -> Iterator[Row]:
 
 def _entering(m: Model, at: _Instants, cells: list[Phase]) -> list[Row]:
     """T <= (z + width v)/2 + d z' while the closing is within its cell: the chord of max(0, z)."""
-    most, unit = 0.5 * at.speed * (at.c1 - at.c0), np.eye(8)
+    most, unit = (0.5 * at.speed + m.d * m.drag) * (at.c1 - at.c0), np.eye(8)
     entering = [k for k, cell in enumerate(cells) if cell.shaft == "enter" and at.rises]
     return [Row(k + 1, unit[MEAN] / cells[k].length, most) for k in entering]
 
@@ -475,10 +475,11 @@ def _instants(m: Model, at: _Instants, box: Box, node: dict[float, int]) -> Iter
     unit, closed = np.eye(8), at.c1 <= at.o0
     if box.close and closed and at.c1 in node and at.c1 < 0.0:
         yield Row(node[at.c1], -unit[Z], 0.0)
-    if box.part and m.pushed and closed and at.o0 in node:
+    if box.part and closed and at.o0 in node:
         width = at.o1 - at.o0
-        yield Row(node[at.o0], unit[Z], 0.0, width + m.d * (not m.pulls))
-        yield Row(node[at.o0], unit[W1] - unit[W2], 0.0, width)
+        back = width + m.d * (not m.pulls)
+        yield Row(node[at.o0], unit[Z], m.drag * back, back)
+        yield Row(node[at.o0], unit[W1] - unit[W2], m.drag * width, width)
     if box.move and at.s1 in node:
         width = at.s1 - at.s0
         yield Row(node[at.s1], unit[W2], -m.mu2 * m.mc * width, m.mu2 * width)

@@ -80,6 +80,9 @@ class Model:
         self.demand = R if self.lag > 0.0 and self.ramped else U
         self.T = np.array([1.0, self.d, -self.d, 0.0, 0.0, 0.0, 0.0, 0.0])  # of x, in contact
         self.x0 = np.eye(8)[Z] * self.z0
+        assert problem.start_time is not None
+        self.end = problem.start_time * Omega * (1.0 + ROUNDING)
+        self.least = self.mc + self.W / (self.mu2 * self.end)  # P, by momentum alone
         self.steps = dict[Phase, Step]()
 
     @cached_property
@@ -92,22 +95,24 @@ class Model:
         return 2.0 * (math.acos(share) if share < 1.0 else math.acosh(share)) / q
 
     @cached_property
-    def pushed(self) -> bool:
-        """Whether (u - friction)/J1 + (load torque)/J2 is never below 0."""
-        pull = 0.0 if self.b2 > 0.0 or self.sticks else self.mc * self.mu2
-        return self.b1 == 0.0 and self.F * self.mu1 <= pull
+    def drag(self) -> float:
+        """(Friction of the motor)/J1 - (load torque)/J2, if above 0: z'' is no lower by itself."""
+        pull = 0.0 if self.sticks or (self.pulls and self.b2 > 0.0) else self.mc
+        falling = math.exp(-self.mu2 * self.b2 * self.end)  # as the load falls viscous friction holds it back
+        most = self.F + self.b1 * self.mu1 * self.hi * self.end
+        return max(0.0, self.mu1 * most - self.mu2 * pull * falling)
 
     @cached_property
     def lasts(self) -> float:
         """No first contact is shorter."""
-        return self.pushed * self.half * (0.5 if self.z0 > 0.0 else 1.0) * (1.0 - 1e-9)
+        return (self.drag == 0.0) * self.half * (0.5 if self.z0 > 0.0 else 1.0) * (1.0 - 1e-9)
 
     @cached_property
     def quickest(self) -> float:
-        """No contact has a larger z' than so much times P, else T would exceed P (if `pushed`)."""
+        """No contact has a larger z' than so much times P, else T would exceed P."""
         step, x = expm(np.array([[0.0, 1.0], [-1.0, -self.d]]) * (self.half / 400)), np.array([0.0, 1.0])
         path = [x, *(x := step @ x for _ in range(400))]
-        return 1.0 / max(float(z + self.d * v) for z, v in path)
+        return 1.0 / max(float(z + self.d * v) for z, v in path) + 0.5 * self.half * self.drag / self.least
 
     def matrices(self, phase: Phase) -> tuple[Matrix, Vector, Matrix]:
         """A, g, B."""
