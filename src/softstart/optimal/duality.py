@@ -55,7 +55,8 @@ from softstart.optimal.starts import parts
 Span = tuple[float, float]
 
 WITHIN = 5e-4  # the work ends once the bound is within this share of what is judged
-SECONDS = 3.5, 6.0  # of processor time, for starts that close once and for all the others
+SECONDS = 10.0  # of processor time, this share for starts that close once, the rest for all others
+FOR_ONCE = 0.5
 PARTS = 400  # of the ends of a box, of each of which is known what is proved
 PROGRAMS = 12  # for one box at most
 PER_PERIOD, LONG, EDGE = 18, 3.0, 4.0  # cells of a period; longer ones where T is held, so far from events
@@ -102,11 +103,14 @@ def _not_covered(problem: Problem, machine: Any) -> str:
     })  # fmt: skip
 
 
-def dual_bounds(problem: Problem, k_dyn: float, end: float | None = None) -> tuple[LowerBound, LowerBound]:
+def dual_bounds(
+    problem: Problem, k_dyn: float, end: float | None = None, *, seconds: float = SECONDS
+) -> tuple[LowerBound, LowerBound]:
     """Lower bounds on K_dyn for any number of contacts, and for starts whose gap closes once.
 
     Both hold for every start that ends at the start time, or `end` in s, or before. `k_dyn` is what is to be
-    judged: the work ends once a bound is within 5e-4 of it. Where nothing is better the momentum bound.
+    judged: the work ends once a bound is within 5e-4 of it, or after so many seconds of processor time. Where
+    nothing is better the momentum bound.
 
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
     >>> for bound in dual_bounds(Problem(drive.replace(torque_lag=0.002), 0.2883042), 0.9237):
@@ -125,7 +129,7 @@ def dual_bounds(problem: Problem, k_dyn: float, end: float | None = None) -> tup
         left = [i for i in (0, 1) if best[i].k_dyn < k_dyn * (1.0 - WITHIN)]
         if not left or whole.kind == "none":
             break
-        found = _Search(problem, machine, k_dyn).both(len(problem.machines))
+        found = _Search(problem, machine, k_dyn).both(seconds / len(problem.machines))
         for i, peak in enumerate(found):
             if peak * float(machine.Ms) / problem.base_torque > best[i].k_dyn:
                 best[i] = LowerBound(
@@ -186,15 +190,15 @@ class _Search:
             self.tail = min(self.tail, 0.99 * m.W / (m.mu2 * m.mc))
         self.after, self.until = self.coasting(), 0.0
 
-    def both(self, machines: int) -> tuple[float, float]:
+    def both(self, seconds: float) -> tuple[float, float]:
         """(any number of contacts, those that close once): the least P, in Ms."""
         m = self.model
-        self.until = time.process_time() + SECONDS[0] / machines
+        self.until = time.thread_time() + FOR_ONCE * seconds
         once = self.least(self.boxes([None], False), self.goal)
         parted: list[Span | None] = [] if m.joined else [(0.0, math.inf)]
         if not m.sticks and not parted:
             return once, once
-        self.until = time.process_time() + SECONDS[1] / machines
+        self.until = time.thread_time() + (1.0 - FOR_ONCE) * seconds
         more = self.boxes([None, *parted] if m.sticks else parted, m.sticks)
         return min(once, self.least(more, min(once, self.goal))), once
 
@@ -275,7 +279,7 @@ class _Search:
         heapq.heapify(heap)
         while heap:
             value, _, box, done = heapq.heappop(heap)
-            if value >= goal or time.process_time() > self.until:
+            if value >= goal or time.thread_time() > self.until:
                 return value
             if not done:
                 low, box = self.judged(box, goal)
@@ -295,7 +299,7 @@ class _Search:
         edges = np.linspace(low, high, PARTS + 1)
         for _ in range(PROGRAMS):
             k = PARTS - 1 - int(np.argmin(known[::-1]))
-            if known[k] >= goal or time.process_time() > self.until:
+            if known[k] >= goal or time.thread_time() > self.until:
                 break
             at = layout(self, box, float(edges[k + 1]))
             if (by := good_multipliers(self.model, at)) is None:

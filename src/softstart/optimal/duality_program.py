@@ -20,6 +20,7 @@ from scipy.linalg import expm
 
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
+from softstart.optimal.bounds import half_period
 from softstart.optimal.problem import Problem
 
 # z beyond the driving flank, speeds, torque u, demand r behind its rate limit, y (never below z); integrals
@@ -80,19 +81,11 @@ class Model:
         self.demand = R if self.lag > 0.0 and self.ramped else U
         self.T = np.array([1.0, self.d, -self.d, 0.0, 0.0, 0.0, 0.0, 0.0])  # of x, in contact
         self.x0 = np.eye(8)[Z] * self.z0
+        self.half = half_period(drive) * Omega  # no push on the shaft lowers T sooner
         assert problem.start_time is not None
         self.end = problem.start_time * Omega * (1.0 + ROUNDING)
         self.least = self.mc + self.W / (self.mu2 * self.end)  # P, by momentum alone
         self.steps = dict[Phase, Step]()
-
-    @cached_property
-    def half(self) -> float:
-        """No push on the shaft lowers T sooner than after so long: the first zero of h + d h'."""
-        share = 0.5 * self.d
-        q = math.sqrt(abs(1.0 - share * share))
-        if q < 1e-6:
-            return 2.0
-        return 2.0 * (math.acos(share) if share < 1.0 else math.acosh(share)) / q
 
     @cached_property
     def drag(self) -> float:

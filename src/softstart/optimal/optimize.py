@@ -17,7 +17,7 @@ from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.kernel import records as rec
 from softstart.optimal import pulse_coast_hold, seeds
-from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
+from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time
 from softstart.optimal.check import check, replayed
 from softstart.optimal.descent import APART, MANY, MISSED, MOST_KNOTS, TASTE, Candidate, Descent
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
@@ -57,6 +57,7 @@ MOST_TRIALS = 32
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 ROUGH = 3e-4  # of K_dyn: how exactly an answer is followed before its knots are refined
 TIGHT = 1e-5  # a bound within this share needs no other one
+SECONDS = 3.0  # of processor time for the bounds of an answer
 
 
 @single_threaded_blas
@@ -380,29 +381,18 @@ def _checked(
         problem if problem.start_time else replace(problem, start_time=end, minimise="k_dyn")
     )
     k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
-    if _certifiable(problem, method) and k_dyn > bound.k_dyn * (1.0 + TIGHT):
-        from softstart.optimal.certificate import certified_bound
+    once = None
+    if problem.minimise == "k_dyn" and k_dyn > bound.k_dyn * (1.0 + TIGHT):
+        from softstart.optimal.duality import dual_bounds
 
-        closed = [event.time for event in runs[0].events if event.kind == "gap closed" and event.time < end]
-        if len(closed) <= 1:  # it covers these only
-            certified = certified_bound(problem, k_dyn, entry_near=runs[0].first_contact)
-            bound = max(bound, certified, key=lambda one: one.k_dyn)
+        bound, once = dual_bounds(problem, k_dyn, seconds=SECONDS)
     check(problem, profile, runs, end, claimed, bound)
     least = least_heat(problem) if problem.minimise == "heat" else 0.0
     seconds = time.perf_counter() - began
     return Optimum(
         problem, profile, runs, bound, method, why, claimed, end, seconds, heat_at_least=least,
-        tried=(Trial(method, claimed, seconds, ""),),
+        tried=(Trial(method, claimed, seconds, ""),), bound_once=once,
     )  # fmt: skip
-
-
-def _certifiable(problem: Problem, method: Method) -> bool:
-    """Whether the certificate covers the problem: one drive with an ideal torque."""
-    from softstart.optimal.certificate import not_certified
-
-    alone = problem.minimise == "k_dyn" and problem.heat is None and len(problem.machines) == 1
-    pair = two_masses(problem.machines[0]) if alone and method != "closed-form" else None
-    return pair is problem.drive and problem.ideal_torque and not not_certified(problem)
 
 
 def _alone(problem: Problem) -> dict[str, Optimum]:

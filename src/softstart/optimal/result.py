@@ -18,7 +18,7 @@ from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
 Method = Literal["closed-form", "descent", "collocation"]
-BoundKind = Literal["certificate", "duality", "momentum", "none"]
+BoundKind = Literal["duality", "momentum", "none"]
 BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left
 
 
@@ -141,6 +141,8 @@ class Optimum(Result, view="optima.optimum_sheet"):
         Where the quickest start was asked for, how it keeps the limits, and the lower bound of its time.
     heat_at_least : float
         Where the heat is minimised: no start has less, s.
+    bound_once : LowerBound or None
+        What no start goes below whose gap closes once and stays closed; None where only `bound` is known.
 
     Examples
     --------
@@ -163,6 +165,7 @@ class Optimum(Result, view="optima.optimum_sheet"):
     tried: tuple[Trial, ...] = ()
     kept: Kept | None = None
     heat_at_least: float = 0.0
+    bound_once: LowerBound | None = None
 
     @property
     def k_dyn_each(self) -> tuple[float, ...]:
@@ -250,6 +253,7 @@ class Optimum(Result, view="optima.optimum_sheet"):
             "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,
             "bound_kind": self.bound.kind,
             "bound_covers": self.bound.covers,
+            "k_dyn_lower_bound_once": self.bound_once and self.bound_once.k_dyn,
             "gap_percent": self.optimality_gap_percent
             if bounded and math.isfinite(self.optimality_gap_percent)
             else None,

@@ -28,7 +28,7 @@ LATE, GENTLE = 0.30778594119021396, 1.7902284419255463
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """A small part of the time, and a coarse grid: less is proved, and all of it holds."""
-    monkeypatch.setattr(duality, "SECONDS", (0.15, 0.15))
+    monkeypatch.setattr(duality, "SECONDS", 0.3)
     monkeypatch.setattr(duality, "PER_PERIOD", 9)
 
 
@@ -87,7 +87,7 @@ def answered(
 
 def judged(problem: Problem, k_dyn: float, closings: int) -> float:
     """The bound for any number of contacts; none is above the start that it covers."""
-    every, once = dual_bounds(problem, k_dyn)
+    every, once = dual_bounds(problem, k_dyn, seconds=duality.SECONDS)
     assert momentum_bound(problem).k_dyn <= every.k_dyn <= once.k_dyn
     assert every.k_dyn <= k_dyn * (1.0 + 1e-7)
     if closings <= 1 and "moving on" not in once.covers:
@@ -108,7 +108,7 @@ def test_no_start_is_below(seed: int, quick: None) -> None:
 def search(problem: Problem, k_dyn: float) -> tuple[float, float]:
     """Both bounds without that of momentum."""
     drive: Any = problem.drive
-    found = duality._Search(problem, drive, k_dyn).both(1)
+    found = duality._Search(problem, drive, k_dyn).both(10.0)
     return tuple(peak * float(drive.Ms) / problem.base_torque for peak in found)  # type: ignore[return-value]
 
 
@@ -120,18 +120,17 @@ def test_it_reaches_the_closed_form(terminal: Any) -> None:
         assert (1.0 - 1e-3) * k_dyn < bound <= k_dyn
 
 
-def test_it_is_close_where_momentum_is_far(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_is_close_where_momentum_is_far() -> None:
     """A start that ends before the start time is gentler than all that end then: the end is not given."""
-    monkeypatch.setattr(duality, "SECONDS", (2.5, 0.5))
     drive = Drive(
         motor_inertia=0.0011775836, load_inertia=0.0050531922, stiffness=6.3996351922, gap=3.7665896673,
         load_torque=25.3638563977, starting_torque=52.4499622595, load_viscous_friction=0.00020294210132,
         start_position="opposite-flank", target_speed=1296.6271754117,
     )  # fmt: skip
     problem = Problem(drive, LATE, "reached")
-    every, once = dual_bounds(problem, GENTLE)
+    every, once = dual_bounds(problem, GENTLE, seconds=6.0)
     assert momentum_bound(problem).k_dyn < every.k_dyn < 0.56 * GENTLE + 0.44 * once.k_dyn
-    assert 0.97 * GENTLE < once.k_dyn <= GENTLE
+    assert 0.93 * GENTLE < once.k_dyn <= GENTLE
     assert once.kind == every.kind == "duality"
     assert "whose gap closes once and stays closed until the target speed is reached" in once.covers
 
@@ -139,7 +138,7 @@ def test_it_is_close_where_momentum_is_far(monkeypatch: pytest.MonkeyPatch) -> N
 def test_more_time_lowers_it(quick: None) -> None:
     """As the ends of all sooner starts are among those of the later."""
     drive = CRANE.replace(torque_lag=0.004, damping=0.5)
-    bounds = [dual_bounds(Problem(drive, time), 3.0)[1].k_dyn for time in (0.27, 0.28, 0.3)]
+    bounds = [dual_bounds(Problem(drive, time), 3.0, seconds=0.3)[1].k_dyn for time in (0.27, 0.28, 0.3)]
     assert bounds[0] > 1.01 * bounds[1] > 1.02 * bounds[2]
 
 
@@ -183,6 +182,8 @@ def test_momentum_is_left_where_it_does_not_cover(given: dict[str, Any], why: st
 
 def test_several_machines_have_the_largest(quick: None) -> None:
     gaps = [CRANE.replace(gap=gap) for gap in (0.25, 0.5)]
-    alone = [dual_bounds(Problem(gap, 0.29, "reached", base=CRANE), 1.4)[0].k_dyn for gap in gaps]
-    both = dual_bounds(Problem(gaps[0], 0.29, base=CRANE, scenarios=(gaps[1],)), 1.4)[0].k_dyn
+    alone = [
+        dual_bounds(Problem(gap, 0.29, "reached", base=CRANE), 1.4, seconds=0.4)[0].k_dyn for gap in gaps
+    ]
+    both = dual_bounds(Problem(gaps[0], 0.29, base=CRANE, scenarios=(gaps[1],)), 1.4, seconds=0.8)[0].k_dyn
     assert both > 0.9 * max(alone)
