@@ -242,6 +242,11 @@ class Multipliers(NamedTuple):
 # good multipliers: a linear program -------------------------------------------------------------------------
 
 
+class _Quiet(highspy.Highs):
+    def enableCallbacks(self) -> None:  # to enable them prints a line, and none is needed
+        pass
+
+
 class _Program:
     """minimise P over x at the nodes and inputs that are constant in each cell, rows and equations held.
 
@@ -338,7 +343,7 @@ class _Program:
         count = self.shared(first := value.size + limit.size + e.size)
         i, j, entries = (np.concatenate(one) for one in zip(*self.parts, strict=True))
         A = sparse.csr_matrix((entries, (i, j)), shape=(count, self.cost.size))
-        program, solver = highspy.HighsLp(), highspy.Highs()  # type: ignore[no-untyped-call]
+        program, solver = highspy.HighsLp(), _Quiet()  # type: ignore[no-untyped-call]
         program.num_row_, program.num_col_ = A.shape
         program.col_cost_, program.col_lower_, program.col_upper_ = self.cost, self.low, self.high
         rest = np.full(count - first, -np.inf)
