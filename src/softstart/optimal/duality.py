@@ -307,8 +307,8 @@ class _Search:
             times, bound = proved(self.model, at, by)
             known = np.maximum(known, bound[-1] if low == high else _least_within(times, bound, edges))
             if known[k] < goal:
-                if by.value < goal or box.finer >= FINEST:
-                    break
+                if by.value - known[k] < 0.25 * (goal - known[k]) or box.finer >= FINEST:
+                    break  # it is less the cells than the width of the box
                 box = replace(box, finer=2 * box.finer)
         return float(known.min()), replace(box, known=known)
 
@@ -336,8 +336,7 @@ class _Search:
         """The halves of a box; none where it is narrow."""
         sticks = self.model.sticks
         weights = {"close": 0.5 if sticks else 4.0, "move": 4.0, "part": 1.0}
-        if not box.close:
-            weights["start"] = 4.0
+        weights["start"] = 1.0 if box.close else 4.0
         spans = {name: span for name in weights if (span := getattr(box, name))}
         name = max(spans, key=lambda one: weights[one] * (spans[one][1] - spans[one][0]))
         low, high = spans[name]

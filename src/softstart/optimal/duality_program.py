@@ -31,7 +31,7 @@ Z, W1, W2, U, R, Y, MEAN, RAMPED = range(8)
 DEMAND, RUB, PUSH, PULL, HOLD, BEGIN = range(6)
 STEPS, MOST_STEPS = 12, 400  # of a cell: integrals are enclosed in each
 ROUNDING = 1e-10  # of the sum of the absolute terms is taken off
-MISSED, BROKEN = 60.0, 300.0  # price of what a terminal row misses, and of what all rows without P do
+MISSED, BROKEN = 15.0, 75.0  # price of what a terminal row misses, and of what all rows without P do
 RIPPLE = 5e-4  # the program prefers means of T to T at instants, whose multipliers let q ripple
 QUICK = 0.01  # a lag below this is left out: a quicker torque can do all that a slower one does
 
@@ -337,7 +337,7 @@ class _Program:
         return count
 
     def solve(self) -> Multipliers | None:
-        """By an interior point; None where HiGHS finds no end."""
+        """Duals and value; None where HiGHS finds no end."""
         value, at = self.motion(), self.at
         limit, e = self.rows(value.size), np.array([e for _, e in at.terminal])
         count = self.shared(first := value.size + limit.size + e.size)
@@ -355,8 +355,12 @@ class _Program:
         for name, option in OPTIONS.items():
             solver.setOptionValue(name, option)
         solver.passModel(program)
-        solver.run()
-        if solver.getModelStatus() != highspy.HighsModelStatus.kOptimal:
+        for way in ("ipx", "simplex"):  # the interior point ends without an answer now and then
+            solver.setOptionValue("solver", way)
+            solver.run()
+            if solver.getModelStatus() == highspy.HighsModelStatus.kOptimal:
+                break
+        else:
             return None
         _, inner, terminal, _ = np.split(
             np.array(solver.getSolution().row_dual), [value.size, value.size + limit.size, first]
@@ -366,7 +370,7 @@ class _Program:
 
 
 OPTIONS: dict[str, bool | float | str] = {  # with presolve many of these programs fail
-    "output_flag": False, "presolve": "off", "solver": "ipx", "run_crossover": "off", "threads": 1,
+    "output_flag": False, "presolve": "off", "run_crossover": "off", "threads": 1,
     "time_limit": 3.0,
 }  # fmt: skip
 
