@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 42709, "tests": 29561}
+MOST = {"src, controllers": 43220, "tests": 29693}
 LONGEST_FILE = 560  # statements
 LONGEST_FUNCTION = 70  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef

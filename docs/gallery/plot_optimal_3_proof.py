@@ -46,12 +46,12 @@ primal.set_label("The optimal torque, that of the descent, and the shaft torque 
 # %%
 # **Bounds.** Momentum: the load gains its speed from a shaft torque of at most *P*, which cannot begin before
 # the first contact. For this drive the bound is the optimum. Where K_dyn is above 1 no torque holds *P*, and
-# momentum alone leaves much open; there the certificate, multipliers that show that no torque of a start with
-# one contact is better, is within 0.1 %.
+# momentum alone leaves much open; there weak duality shows that no torque of a start with one contact is
+# better by more than 0.5 %.
 for start_time in (0.2883042, 0.2522662):
     best = optimize(drive, start_time, terminal="reached")
     momentum = momentum_bound(Problem(drive, start_time, "reached")).k_dyn
-    bound = best.bound
+    bound = best.bound_once or best.bound
     print(f"{start_time} s: K_dyn {best.k_dyn:.5f}, momentum {momentum:.5f}, {bound.kind} {bound.k_dyn:.5f}")
     print(f"  covers {bound.covers}")
 

@@ -24,7 +24,7 @@ def optimum(**options) -> Optimum:
     problem = Problem(CRANE, 0.28, **options)
     profile = TorqueProfile.steps([0.0, 0.0184, 0.0333, 0.34], [62.0, 0.0, 55.0])
     runs = replayed(problem, profile, 0.28)
-    bound = LowerBound(0.9, "certificate", "all")
+    bound = LowerBound(0.9, "duality", "all")
     return Optimum(problem, profile, runs, bound, "descent", "why", 1.0, 0.28, 0.1)
 
 

@@ -97,6 +97,7 @@ def _no_solution() -> Iterator[None]:
 @option("--torque-speed", _corners)
 @option("--smoothness", quantity("s", least=0.0))
 @option("--confirm", is_flag=True)
+@option("--bounds", is_flag=True)
 @option("--gaps", _each("rad"))
 @option("--inertias", _each("kg*m^2"))
 @option("--load-torques", _each("N*m"))
@@ -132,6 +133,8 @@ def optimize_command(
         Weight of torque smoothness, for example 0.001 (s). Default: 0.
     --confirm
         Also solve the CasADi problem from its own initial guess, and show both results.
+    --bounds
+        Also compute tight lower bounds of K_dyn (some 10 s).
     --gaps GAP,...
         Compute one profile for the drive with each of these gaps.
     --inertias INERTIA,...
@@ -141,12 +144,12 @@ def optimize_command(
     --out DIR
         Write profile (CSV, TOML, C), figure (SVG, PNG), traces (CSV) and report.md into this folder.
     """
-    bounds = {name: value for name, value in arguments.items() if value is not None}
+    given = {name: value for name, value in arguments.items() if value is not None}
     varied = {"gaps": gaps or (), "inertias": inertias or (), "load_torques": load_torques or ()}
-    with _no_solution(), working("optimizing the start ..."):
+    with _no_solution(), working("optimizing the start ...") as progress:
         with options.named_as_options():
             others = softstart.scenarios_of(drive, **varied)[1:]
-        best = softstart.optimize(drive, scenarios=others, **bounds)
+        best = softstart.optimize(drive, scenarios=others, progress=progress, **given)
     with working("simulating the shipped controllers ..."):
         beside = [] if others else _runs_beside(best)
     from softstart.views.optima import controller_summary, optimum_sheet

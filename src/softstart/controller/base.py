@@ -455,6 +455,17 @@ class CompiledController(Controller):
         """What the kernel needs beside parameters and drive, by name; called on a fitted controller."""
         return {}
 
+    def named_numbers(self, drive: Drive) -> dict[str, float]:
+        """The numbers of `vector` by name; those of a record within the record as `record.name`.
+
+        >>> from softstart.controller import make_controller
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> numbers = make_controller("reduced-two-stage").fitted(crane).named_numbers(crane)
+        >>> {name: round(number, 4) for name, number in numbers.items()}
+        {'torque': 15.386, 'full_torque': 62.0, 'wait': 0.0164}
+        """
+        return dict(zip(_names(self.record), self.vector(drive).tolist(), strict=True))
+
     def _in_order(self, record: np.dtype[np.void], numbers: Numbers, drive: Drive) -> Iterator[float]:
         for name in record.names or ():
             source = self if hasattr(self, name) else drive
@@ -469,6 +480,13 @@ class CompiledController(Controller):
                 yield from self._in_order(record[name], value, drive)
             else:
                 yield value
+
+
+def _names(record: np.dtype[np.void], before: str = "") -> Iterator[str]:
+    """The names of the numbers of a record, in order."""
+    for name in record.names or ():
+        within = record[name].names is not None
+        yield from _names(record[name], f"{before}{name}.") if within else (before + name,)
 
 
 class ReadyControllers(NamedTuple):

@@ -10,7 +10,7 @@ import io
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Literal, NamedTuple, cast, get_args
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.controller.base import Controller, Effort, Sensor, SetUp, label_of
+from softstart.controller.base import CompiledController, Controller, Effort, Sensor, SetUp, label_of
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
 from softstart.errors import InputError
@@ -213,6 +213,34 @@ def scheduled(saved: ScheduleFile, label: str, controller: Controller) -> GainSc
     return schedule
 
 
+def derived_from_nominal(tuned: RobustGains, given: Controller, drives: Iterable[Drive]) -> dict[str, object]:
+    """Values that tuned gains derive from the nominal drive, the controller `given` otherwise from others.
+
+    By name, in SI units: parameters that are not given to it, then numbers that its step has beside all
+    parameters. With the gains alone, set up for one of these drives, it is thus another controller.
+
+    >>> from softstart.controller import make_controller
+    >>> crane, given = Drive.load("crane-4amtkf"), make_controller("reduced-two-stage", {"torque": 15.5})
+    >>> tuned = RobustGains("robust", given.fitted(crane), crane)
+    >>> derived = derived_from_nominal(tuned, given, [crane.replace(gap=1)])
+    >>> {name: round(value, 4) for name, value in derived.items()}
+    {'wait': 0.0164}
+    """
+    ready, nominal = tuned.controller.set_up(tuned.nominal)
+    exact = given.set_up(nominal)[0].parameters
+
+    def numbers(drive: Drive) -> dict[str, float]:
+        return ready.named_numbers(drive) if isinstance(ready, CompiledController) else {}
+
+    names, here = dict[str, None](), numbers(nominal)
+    for drive in drives:
+        own, there = given.set_up(drive)[0].parameters, numbers(drive)
+        names |= {name: None for name, value in exact.items() if own[name] != value}
+        names |= {name: None for name, value in here.items() if there[name] != value}
+    known = {**ready.parameters, **here}
+    return {name: known[name] for name in sorted(names, key=list(known).index)}
+
+
 # ---- reading --------------------------------------------------------------------------------------------
 
 
@@ -325,6 +353,11 @@ def _positive(gains: dict[str, Gain], path: Path) -> dict[str, Gain]:
     return gains
 
 
+DERIVED = (
+    "# derived from the drive below, in SI units: the gains alone, set up for another drive, derive others;\n"
+    "# this file is the same controller for every drive: --controller FILE, in an export --gains FILE"
+)
+
 # ---- writing --------------------------------------------------------------------------------------------
 
 
@@ -341,9 +374,14 @@ def meanings_of(controller: Controller) -> dict[str, str]:
 
 
 def robust_text(
-    saved: RobustFile, about: Mapping[str, object] | None = None, meanings: Mapping[str, str] | None = None
+    saved: RobustFile,
+    about: Mapping[str, object] | None = None,
+    meanings: Mapping[str, str] | None = None,
+    derived: Mapping[str, object] | None = None,
 ) -> str:
     """The TOML text of a robust set; `about` says where it comes from and is not read, nor are `meanings`.
+
+    Nor is `derived`, what it takes from its drive (`derived_from_nominal`).
 
     >>> from pathlib import Path
     >>> saved = RobustFile("ramp", {"time": 0.12}, Drive.load("crane-4amtkf"))
@@ -355,6 +393,7 @@ def robust_text(
         f"controller = {literal(saved.controller)}",
         _table("parameters", saved.parameters, meanings),
         *([_table("about", about)] if about else []),
+        *([f"{DERIVED}\n{_table('about.derived', derived)}"] if derived else []),
         _nested(saved.drive),
     ]
     return "\n\n".join(blocks) + "\n"

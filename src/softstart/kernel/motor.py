@@ -69,6 +69,8 @@ def encoder_count(lines: Any) -> Any:
     >>> round(encoder_count(4096) * 1e6, 2)
     383.5
     """
+    if type(lines) is float:  # as tuning asks by the thousand
+        return 2.0 * math.pi / (COUNTS_PER_LINE * max(lines, 1.0)) if lines > 0.0 else 0.0
     lines = np.asarray(lines, dtype=np.float64)
     count = np.where(lines > 0.0, 2.0 * math.pi / (COUNTS_PER_LINE * np.maximum(lines, 1.0)), 0.0)
     return count if count.ndim else float(count)

@@ -106,6 +106,10 @@ class MachineRecord:
     regulated: float  # 1 where the controller holds the speed: the start ends `dwell` after it has settled
     command_end: float  # when the last command of such a controller has ended, s
     dwell: float  # for how long the load must stay in its band, s; of a stop, all masses in that of rest
+    # a start is given up with a larger |T|, N m, or if it cannot come to its speed by then, s; 0: it is not
+    give_up_torque: float
+    give_up_time: float
+    fastest_rise: float  # of the load speed with |T| up to that, rad/s^2; inf if that is not known
     guard: float  # GuardLimits
 
 
@@ -498,8 +502,8 @@ CLOSED, OPENED, STARTS, STOPS, TARGET_REACHED, RELEASED, IMPACT, SETTLED = _kind
 # why `advance` came back
 (
     ASK, ENDED, BUFFER_FULL, EVENT_LIMIT, NOT_LOCATED, NOT_FINITE, BAD_COMMAND, QUEUE_FULL, TOO_LONG,
-    TOO_STIFF,
-) = range(10)  # fmt: skip
+    TOO_STIFF, NO_BETTER,
+) = range(11)  # fmt: skip
 SPANS_PER_EVENT = 2.0  # so many times as many spans as events are permitted
 
 # what a controller may declare to see beyond time, motor angle, speed and torque

@@ -21,7 +21,7 @@ from softstart.kernel.motor import (
 from softstart.kernel.records import (
     ANSWER, ASK, AT_EVENTS, AT_MACHINE, AT_MASSES, AT_SHAFTS, AT_SHAFT_NOTES, BEYOND, BUFFER_FULL, CURVE,
     ENDED, EVENT_LIMIT, LOWER, MEASURED, MEASURED_TYPE, MOST_MASSES, MOST_NOTED, NOTES, NOT_FINITE,
-    NOT_LOCATED, NO_EVENT,
+    NOT_LOCATED, NO_BETTER, NO_EVENT,
     NO_FAULT, N_NOTES, OF_MASS, OF_SHAFT, OPEN, PRESSED, SEES_SHAFT_TORQUE, SETTLE, SPANS_PER_EVENT,
     S_BRAKED, S_END, S_MASSES, S_PHI, S_REF, S_SLOPE, S_STAGE, S_START, S_U, TONE, TOO_LONG,
     TOO_STIFF, UNSOLVED, UPPER, WELDED, WORK, WORK_TYPE, Record,
@@ -388,6 +388,10 @@ def stop_reason(s: Record, spans: Matrix, events: Matrix) -> int:
             for k in range(s.n - 1):
                 s.first_peak[k] = s.peak[k]
         return ENDED if s.time < s.longest else TOO_LONG
+    if s.give_up_time > 0.0 and math.isnan(s.settled if s.regulated != 0.0 else s.start_time):
+        highest = s.w[s.at_load] + s.fastest_rise * (s.give_up_time - s.time)
+        if highest < (s.band_low if s.regulated != 0.0 else s.target):
+            return NO_BETTER
     while s.pending > 0.0 and s.time >= s.due_time[0]:
         next_in_queue(s)
     if s.time >= s.ask_at:
@@ -444,6 +448,8 @@ def advance(work: Vector, tones: Matrix, spans: Matrix, events: Matrix) -> int:
         for k in range(s.n - 1):
             if s.mode[k] != OPEN and s.mode[k] != BEYOND and peak_within(s, k, n, x, h) == 0:
                 return NOT_LOCATED
+            if 0.0 < s.give_up_torque < abs(s.peak[k]):
+                return NO_BETTER
         if x > 0.0:
             if spans.shape[0] > 0:
                 note_span(s, spans[int(s.n_spans)])

@@ -24,11 +24,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from softstart.arrays import Vector
 from softstart.drive import Drive
 from softstart.kernel import records as rec
-from softstart.optimal.contact_motion import Contact
 from softstart.optimal.problem import Problem
 from softstart.optimal.pulse_coast_hold import (
     PulseCoastHoldStarts,
@@ -132,9 +133,8 @@ def _gentle_contact(problem: Problem, starts: PulseCoastHoldStarts, time: float,
     t_c(P) is that of the soonest contact whose T, coasting, stays below P, on a grid: fewer instants only
     lower the bound.
     """
-    contact = Contact.of(problem.drive)
-    reach = min(contact.half_period, math.pi / contact.Omega)
-    _, by_speed, by_load, _ = contact.torque(np.linspace(0.0, reach, 65), np.array([0.0, 2.0 * reach]))
+    s = np.linspace(0.0, min(half_period(problem.drive), math.pi / problem.drive.Omega), 65)
+    by_speed, by_load = _coasting(problem.drive, s)
     kept = by_speed > 1e-9 * float(np.max(by_speed))
     by_speed, by_load = by_speed[kept], by_load[kept]
     full = starts.push + starts.pull
@@ -158,6 +158,29 @@ def _gentle_contact(problem: Problem, starts: PulseCoastHoldStarts, time: float,
     if low >= high or missing(low) >= 0.0 or missing(high) <= 0.0:
         return low
     return float(brentq(missing, low, high, xtol=1e-14 * high))
+
+
+def half_period(drive: Drive) -> float:
+    """Up to when, s, an impulse of torque cannot lower T in contact: first zero of its response.
+
+    >>> round(half_period(Drive.load("crane-4amtkf").replace(damping=1.0)), 6)
+    0.025525
+    """
+    # c sin(qs)/q + d (cos(qs) - zeta/q sin(qs)) = 0; overdamped with sinh and cosh
+    share = 0.5 * drive.d * drive.Omega / drive.c
+    q = drive.Omega * math.sqrt(abs(1.0 - share * share))
+    if q < 1e-6 * drive.Omega:
+        return float(2.0 / drive.Omega)
+    return float(2.0 * (math.acos(share) if share < 1.0 else math.acosh(share)) / q)
+
+
+def _coasting(drive: Drive, s: Vector) -> tuple[Vector, Vector]:
+    """T after s of contact without motor torque is the first times z' at first, and the second."""
+    both = 1.0 / drive.J1 + 1.0 / drive.J2
+    motion = np.array([[0.0, 1.0, 0.0], [-drive.c * both, -drive.d * both, drive.Mc / drive.J2], [0.0] * 3])
+    every = expm(motion * s[:, None, None])[:, :2, 1:]  # (z, z') by (z', 1) at first
+    by_speed, by_load = (drive.c * every[:, 0] + drive.d * every[:, 1]).T
+    return by_speed, by_load
 
 
 def _of_chain(problem: Problem, machine: Any) -> float | str:

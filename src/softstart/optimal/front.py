@@ -66,6 +66,7 @@ class FrontPoint(OneLine):
     k_dyn_lower_bound: float | None = None
     bound_kind: str = "none"
     bound_covers: str = ""
+    k_dyn_lower_bound_once: float | None = None
     start_time: float | None = None
     heat: float | None = None
     contacts: int | None = None
@@ -452,7 +453,7 @@ def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]
                 why=f"the start for {gentlest.start_time_bound:.6g} s is gentler, and may arrive early",
                 seconds=point.seconds,
             )
-            bounds = ("k_dyn_lower_bound", "bound_kind", "bound_covers")
+            bounds = ("k_dyn_lower_bound", "bound_kind", "bound_covers", "k_dyn_lower_bound_once")
             yield point.start_time_bound, replace(early, **{name: getattr(point, name) for name in bounds})
 
 

@@ -15,7 +15,7 @@ from softstart.drive.limits import Limit
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.optimal import pulse_coast_hold
-from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time, two_masses
+from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time
 from softstart.optimal.check import check, replayed
 from softstart.optimal.descent import Descent, Found
 from softstart.optimal.path import EDGE, Path
@@ -61,6 +61,7 @@ def optimize(
     scenarios: Iterable[Machine] = (),
     limits: bool = False,
     confirm: bool = False,
+    bounds: bool = False,
     near: Optimum | TorqueProfile | None = None,
     progress: Progress | None = None,
 ) -> Optimum:
@@ -103,6 +104,9 @@ def optimize(
     confirm : bool
         Also solve the CasADi problem from its own first guess, in the order of contacts of the answer;
         `tried` has both answers, and the better one is returned.
+    bounds : bool
+        Also compute tight lower bounds on K_dyn, in some 10 s of processor time: for any number of contacts,
+        and for starts whose gap closes once (`bound_once`). Without it the bound is that of momentum.
     near : Optimum or TorqueProfile, optional
         The answer to a similar question, one more first demand; the optima of each machine by itself
         (`alone`) are then left out.
@@ -174,7 +178,8 @@ def optimize(
         problem = replace(problem, terminal="reached")
         best = solve(problem, known, confirm)
         why += ", in which only the load can have the target speed"
-    return replace(best, why=best.why + why, alone=alone)
+    best = replace(best, why=best.why + why, alone=alone)
+    return _bounded(best) if bounds else best
 
 
 @single_threaded_blas
@@ -225,30 +230,24 @@ def _checked(
     bound = momentum_bound(
         problem if problem.start_time else replace(problem, start_time=end, minimise="k_dyn", k_dyn=None)
     )
-    k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
-    if _certifiable(problem, method) and k_dyn > bound.k_dyn * (1.0 + TIGHT):
-        from softstart.optimal.certificate import certified_bound
-
-        closed = [event.time for event in runs[0].events if event.kind == "gap closed" and event.time < end]
-        if len(closed) <= 1:  # it covers these only
-            certified = certified_bound(problem, k_dyn, entry_near=runs[0].first_contact)
-            bound = max(bound, certified, key=lambda one: one.k_dyn)
     check(problem, profile, runs, end, claimed, bound)
     least = least_heat(problem) if problem.minimise == "heat" else 0.0
     seconds = time.perf_counter() - began
     return Optimum(
         problem, profile, runs, bound, method, why, claimed, end, seconds, heat_at_least=least,
-        tried=(Trial(method, claimed, seconds, ""),),
+        tried=(Trial(method, claimed, seconds, ""),), bound_once=once,
     )  # fmt: skip
 
 
-def _certifiable(problem: Problem, method: Method) -> bool:
-    """Whether the certificate covers the problem: one drive with an ideal torque."""
-    from softstart.optimal.certificate import not_certified
+def _bounded(best: Optimum) -> Optimum:
+    """The same with the lower bounds of weak duality, where that of momentum is low."""
+    from softstart.optimal.duality import dual_bounds
 
-    alone = problem.minimise == "k_dyn" and problem.heat is None and len(problem.machines) == 1
-    pair = two_masses(problem.machines[0]) if alone and method != "closed-form" else None
-    return pair is problem.drive and problem.ideal_torque and not not_certified(problem)
+    if best.problem.minimise != "k_dyn" or best.k_dyn <= best.bound.k_dyn * (1.0 + TIGHT):
+        return best
+    bound, once = dual_bounds(best.problem, best.k_dyn)
+    check(best.problem, best.profile, best.runs, best.end_time, best.claimed, bound)
+    return replace(best, bound=bound, bound_once=once)
 
 
 def _alone(problem: Problem, tell: Progress) -> dict[str, Optimum]:

@@ -18,7 +18,7 @@ from softstart.start.recommendation import Margin
 from softstart.start.run import Run
 
 Method = Literal["closed-form", "descent", "collocation"]
-BoundKind = Literal["duality", "certificate", "momentum", "none"]
+BoundKind = Literal["duality", "momentum", "none"]
 BINDING = 1e-3  # a limit is what forbids a quicker start if less than this share of it is left
 
 
@@ -253,6 +253,7 @@ class Optimum(Result, view="optima.optimum_sheet"):
             "k_dyn_lower_bound": self.bound.k_dyn if self.bound.kind != "none" else None,
             "bound_kind": self.bound.kind,
             "bound_covers": self.bound.covers,
+            "k_dyn_lower_bound_once": self.bound_once and self.bound_once.k_dyn,
             "gap_percent": self.optimality_gap_percent
             if bounded and math.isfinite(self.optimality_gap_percent)
             else None,

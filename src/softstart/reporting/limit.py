@@ -72,11 +72,12 @@ class OptimumCurve(OneLine):
         """
         every, single, loose = list[float](), list[tuple[float, float]](), list[float]()
         for p in self.found:
-            bound, left = bound_at(drive, p.start_time_bound), p.optimality_gap_percent
-            over = math.inf if not bound or p.k_dyn is None else 100.0 * (p.k_dyn / bound - 1.0)
+            bound, once = bound_at(drive, p.start_time_bound), p.k_dyn_lower_bound_once
+            known = math.inf if p.k_dyn is None else p.k_dyn
+            over, left = (100.0 * (known / one - 1.0) if one else math.inf for one in (bound, once))
             if over <= TIGHT:
                 every.append(max(over, 0.001))
-            elif p.bound_kind == "certificate" and left is not None and left <= TIGHT:
+            elif left <= TIGHT:
                 single.append((p.start_time_bound, max(left, 0.001)))
             else:
                 loose.append(over)

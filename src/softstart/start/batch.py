@@ -54,10 +54,12 @@ class Batch:
         time_limit: Vector | float | None = None,
         workers: int = 1,
         settled: bool = False,
+        give_up: tuple[Vector, Vector] | None = None,
     ) -> StartResults:
         """The results of machines `which[i]` in place i, of several positions the worst; or of all.
 
-        With `settled` starts under torque strategies are followed on until their load has settled.
+        With `settled` starts under torque strategies are followed on until their load has settled. `give_up`:
+        a torque in N m and a time in s for each start, see `KernelInput.given_up`.
         The set-ups of the controller serve all places, one each, or as many in a row.
         """
         ready, sizes = ReadyControllers.of(set_ups), self.positions[which]
@@ -72,6 +74,8 @@ class Batch:
             chosen = (starts.regulated(ready.regulations, given) for starts in chosen)
         if settled:
             chosen = (starts.watched() for starts in chosen)
+        if give_up is not None:
+            chosen = (starts.given_up(*give_up) for starts in chosen)
         results = [run_set_ups(starts, ready, until, workers) for starts in chosen]
         if len(results) == 1:
             return results[0]
@@ -89,11 +93,13 @@ class Batch:
         time_limit: Vector | float | None = None,
         workers: int = 1,
         settled: bool = False,
+        give_up: tuple[Vector, Vector] | None = None,
     ) -> Figures:
         """Figures by name of the same starts. `base` is M12avg in N m, one or one a start."""
         results = self.results(
-            set_ups, which, until=until, time_limit=time_limit, workers=workers, settled=settled
-        )
+            set_ups, which, until=until, time_limit=time_limit, workers=workers, settled=settled,
+            give_up=give_up,
+        )  # fmt: skip
         values = self.read(results, base, which, until)
         if settled and "settled_time" not in values:  # none has settled
             values["settled_time"] = (np.full(results["settled"].shape, np.nan), "s", "")

@@ -36,6 +36,7 @@ SETTLING_PERIODS: Final = 5.0
 # time limit of other starts more
 PATIENT: Final = 3.0
 SLOW_SHARE: Final = 0.1
+ROUNDED_UP: Final = 1.0 + 1e-6  # a torque that bounds an acceleration
 SAME_SPEED: Final = 1e-6  # speeds of masses joined rigidly, typed with the digits of a data sheet
 
 
@@ -85,6 +86,24 @@ class KernelInput:
             columns["time_limit"] = np.minimum(time_limit, columns["longest"])
         if max_events is not None:
             columns["event_cap"] = max_events
+        return replace(self, machines=machines)
+
+    def given_up(self, torque: Vector, time: Vector) -> KernelInput:
+        """The same, each given up with a larger |T| in N m, or if it cannot be at its speed by a time in s.
+
+        It cannot if T up to that torque accelerates the load too little, dw2/dt <= (T - M)/J2; where more
+        than that acts on the load, it is given up at that time. A start that is not given up is the same to
+        the bit.
+        """
+        machines, at = self.machines.copy(), int(self.machine.load)
+        columns = machines.view(rec.MACHINE)[:, 0]
+        columns["give_up_torque"], columns["give_up_time"] = torque, time
+        load, shafts = self.masses.view(rec.MASS)[:, at, 0], self.shafts.view(rec.SHAFT)[..., 0]
+        beside = min(at, 1) + min(self.count - 1 - at, 1)
+        rise = (ROUNDED_UP * beside * torque - load["Mc"] - load["active"]) / load["J"]
+        more = np.any((shafts["rigid"] != 0.0) | (shafts["eta"] != 1.0), axis=1)
+        known = ~more & (self.curves.shape[1] + self.tones.shape[0] == 0)
+        columns["fastest_rise"] = np.where(known, np.maximum(rise, 0.0), np.inf)
         return replace(self, machines=machines)
 
     def regulated(self, regulations: Sequence[Regulation], given: bool) -> KernelInput:

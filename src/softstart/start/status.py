@@ -48,6 +48,7 @@ class Status(Enum):
         "(1 GB) permit, as its fastest motion is too fast for so long a start. Check the units of damping, "
         "stiffness and inertias, or end the run earlier (until)."
     )
+    NO_BETTER = "The start was given up: its peak or its time is already beyond that of a better one."
     CARRIED_OUT = "The duty was carried out."
     NOT_CARRIED_OUT = (
         "The duty was given up: a step cannot be finished, or does not end; run_duty says which."
@@ -79,6 +80,7 @@ _BROKEN = {
     rec.QUEUE_FULL: Status.QUEUE_FULL,
     rec.TOO_LONG: Status.TOO_LONG,
     rec.TOO_STIFF: Status.TOO_STIFF,
+    rec.NO_BETTER: Status.NO_BETTER,
 }
 
 

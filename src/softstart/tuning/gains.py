@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -14,8 +13,8 @@ from softstart.arrays import Indices, Vector
 from softstart.errors import InputError
 from softstart.parallel import Pool
 from softstart.store import PartStore
-from softstart.tuning.search import CONVERGED, Costs, Populations, evolve, populations
-from softstart.tuning.trials import TIE, Judged, Trials, in_time, shared_costs
+from softstart.tuning.search import CONVERGED, Populations, evolve, populations
+from softstart.tuning.trials import TIE, Judged, Trials, in_time, race
 
 SMOOTHINGS = 4
 SHARES = (1.0, 0.75, 0.5, 0.25)  # of the way to the median of the neighbours
@@ -67,7 +66,7 @@ def best_gains(
     trials: Trials, pool: Pool, parts: PartStore, log: StartCounter, schedule: GainSearch | None = None
 ) -> GainSearch:
     """The best gains of every job; those of some cells of a `schedule` begin the first search of one set."""
-    problem, costs = trials.problem, partial(shared_costs, trials, pool)
+    problem = trials.problem
     if not np.any(np.isfinite(trials.default.metric)):
         what, verb = ("start", "starts") if problem.plan is None else ("duty", "is carried out")
         raise InputError(
@@ -75,17 +74,17 @@ def best_gains(
             f"this result; choose another metric, or give parameters with which it {verb}."
         )
     jobs, restarts = len(trials.drives), problem.restarts
-    last = _searched(trials, costs, parts, log, schedule)
+    last = _searched(trials, pool, parts, log, schedule)
     restart_costs = last.best[1].reshape(jobs, restarts)
     best = np.arange(jobs) * restarts + restart_costs.argmin(axis=1)
     places, best_costs = (part[best] for part in last.best)
     if not trials.robust:
-        places = _smooth(trials, costs, places, best_costs)
+        places = _smooth(trials, pool, places, best_costs)
     return _rounded(trials, _settled(trials, places, restart_costs))
 
 
 def _searched(
-    trials: Trials, costs: Costs, parts: PartStore, log: StartCounter, schedule: GainSearch | None
+    trials: Trials, pool: Pool, parts: PartStore, log: StartCounter, schedule: GainSearch | None
 ) -> Populations:
     """All searches to their end: the restarts of each job in a row. What is kept is gone on from."""
     problem = trials.problem
@@ -93,11 +92,11 @@ def _searched(
     part, random = [title, schedule is not None], (problem.seed, 2 + trials.robust)
     searches = np.repeat(np.arange(len(trials.drives)), problem.restarts)
     size = problem.population * (WIDER if trials.robust else 1)
-    several = trials.starts_of.shape[1]
 
-    def cost_of(indices: Indices, places: Vector) -> Vector:
-        log.starts += len(places) * several
-        return costs(searches[indices], places)
+    def cost_of(indices: Indices, places: Vector, most: Vector) -> Vector:
+        raced = race(trials, pool, searches[indices], places, most)
+        log.starts += raced.starts
+        return raced.costs
 
     if record := parts.find(part):
         now = Populations(np.array(record["places"]), np.array(record["costs"]), record["generation"])
@@ -114,7 +113,7 @@ def _searched(
         written, unkept = time.monotonic(), False
 
     # of several starts the mean is still to become small where the worst one is the same
-    converged = CONVERGED * (TIE if several > 1 else 1.0)
+    converged = CONVERGED * (TIE if trials.starts_of.shape[1] > 1 else 1.0)
     for later in evolve(cost_of, now, random, problem.generations, converged):
         now, unkept = later, True
         if time.monotonic() > written + KEPT_EACH:
@@ -143,7 +142,7 @@ def _seeds(trials: Trials, schedule: GainSearch | None, searches: Indices, most:
     return np.concatenate([defaults[:, None], others], axis=1)
 
 
-def _smooth(trials: Trials, costs: Costs, places: Vector, best_costs: Vector) -> Vector:
+def _smooth(trials: Trials, pool: Pool, places: Vector, best_costs: Vector) -> Vector:
     """Places nearer to the median of their neighbours, where that is equally good within 0.1 %.
 
     First all parameters move together, then each by itself: one that hardly matters is often far off.
@@ -155,9 +154,9 @@ def _smooth(trials: Trials, costs: Costs, places: Vector, best_costs: Vector) ->
     for mask in np.tile(masks, (SMOOTHINGS, 1)):
         aims = np.array([np.median(places[some], axis=0) for some in near])
         nearer = places + np.array(SHARES)[:, None, None] * mask * (aims - places)
-        good = (
-            costs(np.tile(cells, len(SHARES)), nearer.reshape(-1, size)).reshape(len(SHARES), -1) <= allowed
-        )
+        jobs, most = (np.tile(one, len(SHARES)) for one in (cells, allowed))
+        costs = race(trials, pool, jobs, nearer.reshape(-1, size), most).costs
+        good = (costs <= most).reshape(len(SHARES), -1)
         moving = np.flatnonzero(np.any(good, axis=0))
         places = places.copy()
         places[moving] = nearer[np.argmax(good, axis=0)[moving], moving]  # the farthest that is good

@@ -46,11 +46,12 @@ class RobustSet(OneLine):
     """One set of gains for all cells and scenarios.
 
     `parameters` are all parameters of the controller, set up for the nominal drive; `gains` those that were
-    tuned, `defaults` what these were. `worst` is the metric at the quantile over all starts, `worst_default`
-    that of the defaults, `ends` the first at the stiff and at the soft end of an unknown stiffness; `excess`
-    by which share the start times are beyond their bounds at the same quantile (0: in time). `cells` has the
-    figures of each cell. `agreement` of `restarts` searches came
-    within 1 % of the best.
+    tuned, `defaults` what these were. `derived` are values that follow from the nominal drive, and from the
+    drive of a cell, with the gains alone, otherwise (SI units). `worst` is the metric at the quantile over
+    all starts, `worst_default` that of the defaults, `ends` the first at the stiff and at the soft end of an
+    unknown stiffness; `excess` by which share the start times are beyond their bounds at the same quantile
+    (0: in time). `cells` has the figures of each cell. `agreement` of `restarts` searches came within 1 % of
+    the best.
     """
 
     parameters: dict[str, Any]
@@ -63,6 +64,7 @@ class RobustSet(OneLine):
     restarts: int
     cells: xarray.Dataset
     controller: RobustGains
+    derived: dict[str, Any]
     ends: tuple[float, float] | None = None
 
     @property
@@ -95,7 +97,7 @@ class Tuning(Result, view="tuning.tuning_sheet"):
         The schedule half way between the cells, where its gains are interpolated: where these differ much
         from cell to cell, nothing says that it does well there.
     starts : int
-        Simulated starts.
+        Simulated starts, with those that were given up.
     seconds : float
         How long that took, s.
 
@@ -207,7 +209,8 @@ class Tuning(Result, view="tuning.tuning_sheet"):
             saved = RobustFile(self._name(), robust.parameters, robust.controller.nominal)
             worst, before = (float(f"{value:.6g}") for value in (robust.worst, robust.worst_default))
             reached = {"worst": worst, "worst_default": before, "in_time": robust.feasible}
-            text = robust_text(saved, about | reached, meanings_of(robust.controller.controller))
+            meanings = meanings_of(robust.controller.controller)
+            text = robust_text(saved, about | reached, meanings, robust.derived)
         write_whole(Path(path), lambda stream: stream.write(text))
 
     def to_csv(self, path: str | Path) -> None:

@@ -12,7 +12,8 @@ import numpy as np
 
 from softstart.arrays import Indices, Vector
 
-Costs = Callable[[Indices, Vector], Vector]  # which search each place (one a row) belongs to -> costs
+# which search each place (one a row) belongs to, and the cost that matters at most -> costs, right up to that
+Costs = Callable[[Indices, Vector, Vector], Vector]
 
 CONVERGED = 1e-4  # standard deviation of a population's costs, over their mean
 WEIGHTS = 0.5, 1.0  # of the difference of two members, drawn for each candidate
@@ -39,7 +40,8 @@ def populations(costs: Costs, seeds: Vector, size: int, random: tuple[int, ...])
     rng = np.random.default_rng(random)
     fresh = max(size - seeds.shape[1], size // 2, 5)
     places = np.concatenate([seeds, [latin(rng, fresh, seeds.shape[2]) for _ in seeds]], axis=1)
-    cost = costs(np.repeat(np.arange(len(places)), places.shape[1]), np.concatenate(places))
+    searches = np.repeat(np.arange(len(places)), places.shape[1])
+    cost = costs(searches, np.concatenate(places), np.full(searches.shape, np.inf))
     return Populations(places, cost.reshape(places.shape[:2]))
 
 
@@ -49,13 +51,14 @@ def evolve(
     """The populations after each further generation; DE/best/1/bin.
 
     v = x_best + F (x_a - x_b), F drawn from 0.5 to 1, at random where it leaves the box; 70 % of its
-    parameters replace those of a member. The candidate stays if it is no worse. A search whose costs are
+    parameters replace those of a member. The candidate stays if it is no worse, so that a larger cost need
+    not be known. A search whose costs are
     nearly equal is at its end. With the populations of an interrupted search the same ones follow: each
     generation has random numbers of its own.
 
     R. Storn, K. Price, J. Global Optim. 11 (1997) 341-359, doi:10.1023/A:1008202821328.
 
-    >>> bowl = lambda which, x: np.sum((x - 0.3) ** 2, axis=1)
+    >>> bowl = lambda which, x, most: np.sum((x - 0.3) ** 2, axis=1)
     >>> first = populations(bowl, np.full((1, 1, 2), 0.9), 16, (0,))
     >>> *_, last = evolve(bowl, first, (0,), 40)
     >>> last.best[0].round(2).tolist()
@@ -67,7 +70,8 @@ def evolve(
         if not active.size:
             return
         candidates = _candidates(places, cost, np.random.default_rng((*random, number)))[active]
-        candidate_costs = costs(np.repeat(active, places.shape[1]), np.concatenate(candidates))
+        searches = np.repeat(active, places.shape[1])
+        candidate_costs = costs(searches, np.concatenate(candidates), cost[active].ravel())
         candidate_costs = candidate_costs.reshape(candidates.shape[:2])
         better = candidate_costs <= cost[active]
         places, cost = places.copy(), cost.copy()

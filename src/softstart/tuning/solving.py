@@ -191,4 +191,4 @@ def tune(
 def _described(task: Part | CellOptimum) -> str:
     if isinstance(task, CellOptimum):
         return f"the optimum of cell {task.cell + 1}"
-    return f"candidates from number {task.first + 1} on"
+    return f"candidates from number {task.which.start + 1} on"

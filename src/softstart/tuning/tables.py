@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Vector
-from softstart.controller.tuned import GainSchedule, RobustGains
+from softstart.controller.tuned import GainSchedule, RobustGains, derived_from_nominal
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.optimal.optimize import optimize
@@ -52,6 +52,9 @@ def robust_outcome(trials: Trials, search: GainSearch) -> RobustSet:
     ready, nominal = replace(trials.controller, **values).set_up(trials.drives[0])
     if len(trials.problem.drive.positions) > 1:  # controllers are set up for mid-gap; the drive has no such
         nominal = nominal.replace(start_position="unknown")
+    names, tuned = trials.problem.names, RobustGains("robust", ready, nominal)
+    given = replace(trials.controller, **{name: values[name] for name in names})
+    cells = [trials.problem.drive_of(cell).design_drive for cell in range(len(trials.problem.cells))]
     ends = None
     if trials.problem.soft is not None:  # scenarios of the stiff end, then as many of the soft one
         each = _by_cell(trials, search.judged.metric).reshape(len(trials.problem.cells), 2, -1)
@@ -61,7 +64,7 @@ def robust_outcome(trials: Trials, search: GainSearch) -> RobustSet:
     worst, worst_default = (float(_over_scenarios(one.metric[0], quantile)) for one in both)
     return RobustSet(
         parameters=ready.parameters,
-        gains={name: values[name] for name in trials.problem.names},
+        gains={name: values[name] for name in names},
         defaults={name: float(value[0]) for name, value in trials.defaults.items()},
         worst=worst,
         worst_default=worst_default,
@@ -69,7 +72,8 @@ def robust_outcome(trials: Trials, search: GainSearch) -> RobustSet:
         agreement=agreement(search.restart_costs[0], float(search.costs[0])),
         restarts=trials.problem.restarts,
         cells=_dataset(trials.problem, _figures(trials, search.judged)),
-        controller=RobustGains("robust", ready, nominal),
+        controller=tuned,
+        derived=derived_from_nominal(tuned, given, cells),
         ends=ends,
     )
 
@@ -123,7 +127,8 @@ def price_table(sides: dict[str, tuple[Trials, GainSearch]], best: Optima) -> xa
             ratio = np.where(over > 0.0, math.nan, values / least)
             columns[f"{side}_over_optimum"] = (ratio, "1", f"{side} over optimum, if in time")
     if both:
-        ratio = np.where(late, math.nan, columns["robust"][0] / columns["schedule"][0])
+        schedule = columns["schedule"][0]  # 0 where an overshoot is avoided
+        ratio = columns["robust"][0] / np.where(late | (schedule == 0.0), math.nan, schedule)
         columns["robust_over_schedule"] = (ratio, "1", "robust set over schedule, if both are in time")
     return _dataset(problem, columns)
 

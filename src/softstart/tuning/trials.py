@@ -4,6 +4,9 @@ A *job* is what gains are wanted for: each cell of the schedule, judged by the s
 one robust set, judged by all cells. The cost of a candidate is its metric, K_dyn if nobody says otherwise, at
 the quantile over the starts of its job (1: the worst start), if these keep the bound on the start time; else
 the larger, the later they are.
+
+Candidates race against the cost that each of them has to beat: the starts that decided lately come first, and
+once a candidate has lost, nothing more of it is simulated. The cost of one that wins is the same to the bit.
 """
 
 from __future__ import annotations
@@ -44,6 +47,22 @@ class Judged(NamedTuple):
     metric: Vector
     start_time: Vector
 
+    def at(self, index: Any) -> Judged:
+        """A part of both."""
+        return Judged(self.metric[index], self.start_time[index])
+
+
+class Raced(NamedTuple):
+    """Costs of candidates, infinite of those that lost.
+
+    `deciders` are the starts, of those of the job of each candidate, that decided it; `starts` so many were
+    made.
+    """
+
+    costs: Vector
+    deciders: Indices
+    starts: int
+
 
 class Trials:
     """Candidates for the jobs of a problem: one for each cell or, if `robust`, one for all cells.
@@ -67,6 +86,9 @@ class Trials:
         set_up = [self.controller.set_up(drive)[0] for drive in self.drives]
         self.compiled = isinstance(set_up[0], CompiledController) and problem.plan is None
         self.defaults = {name: _defaults(problem, name, set_up) for name in problem.names}
+        size = self.starts_of.shape[1]
+        self.spared = size - _kept(size, problem.quantile)  # so many starts of a candidate do not count
+        self.decided = np.zeros(self.starts_of.shape)  # how many candidates each start has decided lately
         self.time_limit: float | None = None
         self.timeless = np.zeros(self.starts_of.shape, dtype=bool)
         self.default, self.bound = known or self._measured()
@@ -136,6 +158,52 @@ class Trials:
         """The cost of each place, one a row, for a job of its own."""
         return self.cost(jobs, self.judged(jobs, self.values(jobs, places)))
 
+    def raced(self, jobs: Indices, places: Vector, most: Vector, order: Indices) -> Raced:
+        """The costs of places that are `most` at most; the starts of each in its `order`, 1, 1, 2, 4, ....
+
+        A candidate has lost once more of its starts than the quantile spares are beyond the `limits`.
+        """
+        values, limits = self.values(jobs, places), self.limits(jobs, most)
+        judged = Judged(*np.full((2, *order.shape), np.nan))
+        beyond, known = np.zeros((2, *order.shape), dtype=bool), np.zeros(order.shape, dtype=bool)
+        running, done = np.flatnonzero(most > -math.inf), 0
+        while running.size and done < order.shape[1]:
+            which = order[running, done : done + max(done, 1)]
+            at = running[:, None], which
+            now = self.judged(jobs[running], _at(values, running), which=which, limits=limits.at(at))
+            judged.metric[at], judged.start_time[at] = now
+            failed = np.isnan(now.metric) | np.isnan(now.start_time)
+            beyond[:, *at] = failed | (np.array(now) > np.array(limits.at(at)))
+            known[at] = True
+            lost = beyond[:, running].sum(axis=-1).max(axis=0) > self.spared
+            running = running[~lost | (most[running] >= UNFINISHED)]
+            done += which.shape[1]
+        costs = np.full(len(jobs), np.inf)
+        costs[running] = self.cost(jobs[running], judged.at(running))
+        one_by_one = judged.at((..., None))
+        alone = cost(one_by_one.metric, one_by_one.start_time, self.bound[jobs][..., None], 1.0)
+        return Raced(costs, np.where(known, alone, -np.inf).argmax(axis=1), int(known.sum()))
+
+    def limits(self, jobs: Indices, most: Vector) -> Judged:
+        """Metric and time that no start of a candidate may exceed, if its cost is to be `most` at most."""
+        # with no metric below 0 the mean over the starts only adds to the cost
+        decides = in_time(most) & self.problem.metric.startswith(NEVER_NEGATIVE)
+        late = np.where(most < UNFINISHED, np.maximum(most / TOO_SLOW - 1.0, 0.0), np.inf)
+        bound = self.bound[jobs]
+        metric = np.broadcast_to(np.where(decides, most, np.inf)[:, None], bound.shape)
+        return Judged(metric, bound * (1.0 + late + 2.0 * SLACK)[:, None])  # twice: for rounding
+
+    def _give_up(self, starts: Indices, limits: Judged | None) -> tuple[Vector, Vector] | None:
+        """Torque in N m and time in s with which a start is beyond the limits, as `Batch.results` takes them.
+
+        Where the quantile spares starts a peak says nothing of the time, nor the other way round.
+        """
+        if limits is None or self.spared:
+            return None
+        metric = self.problem.metric
+        base: Any = self.base[starts] if metric == "k_dyn" else 1.0 if metric == "peak_torque" else math.inf
+        return ((1.0 + SLACK) * base * limits.metric).ravel(), limits.start_time.ravel()
+
     def cost(self, jobs: Indices, judged: Judged) -> Vector:
         """The cost of what candidates reach."""
         return cost(judged.metric, judged.start_time, self.bound[jobs], self.problem.quantile)
@@ -144,14 +212,26 @@ class Trials:
         """Start time over its bound, at the quantile over the starts of each job."""
         return np.asarray(upper(judged.start_time / self.bound[jobs], self.problem.quantile))
 
-    def judged(self, jobs: Indices, values: Values, to_the_end: bool = False) -> Judged:
+    def judged(
+        self,
+        jobs: Indices,
+        values: Values,
+        to_the_end: bool = False,
+        which: Indices | None = None,
+        limits: Judged | None = None,
+    ) -> Judged:
         """What candidates reach, each for a job of its own; NaN where the controller refuses its values.
 
-        Without values: the controller as it is. `to_the_end` for gains that are settled: a start flies
-        through its gaps in spans that end with the time limit, and rounds by their length; without it the
-        figures are those of `simulate` to the bit.
+        Without values: the controller as it is. `which` starts of its job each candidate makes: all by
+        default. A start that is given up as it is beyond the `limits` has NaN too. `to_the_end` for gains
+        that are settled: a start flies through its gaps in spans that end with the time limit, and rounds by
+        their length; without it the figures are those of `simulate` to the bit.
         """
-        starts = self.starts_of[jobs]
+        if which is None:
+            which = np.tile(np.arange(self.starts_of.shape[1]), (len(jobs), 1))
+        starts, timeless = (
+            np.take_along_axis(one[jobs], which, axis=1) for one in (self.starts_of, self.timeless)
+        )
         set_ups = (
             replace(self.controller, **{name: float(value[k]) for name, value in values.items()}).set_up(
                 self.drives[job]
@@ -160,18 +240,23 @@ class Trials:
         )
         try:
             limit = None if to_the_end else self.time_limit
-            figures = self.batch.figures(set_ups, self.base[starts].ravel(), starts.ravel(), time_limit=limit)
+            figures = self.batch.figures(
+                set_ups, self.base[starts].ravel(), starts.ravel(), time_limit=limit,
+                give_up=self._give_up(starts, limits),
+            )  # fmt: skip
         except InputError:
             if not values:
                 raise  # the defaults are no candidate: the input is wrong
             if len(jobs) == 1:
                 return Judged(*np.full((2, *starts.shape), np.nan))
             each = [
-                self.judged(jobs[k : k + 1], {n: v[k : k + 1] for n, v in values.items()}, to_the_end)
-                for k in range(len(jobs))
+                self.judged(jobs[k], _at(values, k), to_the_end, which[k], limits and limits.at(k))
+                for k in (slice(k, k + 1) for k in range(len(jobs)))
             ]
             return Judged(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
         metric = self.problem.metric
+        if metric not in figures and values:
+            return Judged(*np.full((2, *starts.shape), np.nan))  # one that only starts have that get so far
         if metric not in figures:
             near = nearest(metric, figures)
             hint = f"did you mean {near}?" if near else f"choose one of {', '.join(figures)}."
@@ -179,8 +264,13 @@ class Trials:
             raise InputError(f'metric = "{metric}": this is not a result of a {what}; {hint}')
         time = limited_time(figures).reshape(starts.shape)
         figure = figures[metric][0].reshape(starts.shape)
-        time = np.where(self.timeless[jobs] & ~np.isnan(figure), 0.0, time)
+        time = np.where(timeless & ~np.isnan(figure), 0.0, time)
         return Judged(1.0 - figure if metric == MARGIN else figure.astype(np.float64), time)
+
+
+def _at(values: Values, index: Any) -> Values:
+    """The values of some candidates."""
+    return {name: value[index] for name, value in values.items()}
 
 
 def _starts_of_cells(problem: TuningProblem) -> Batch | DutyBatch:
@@ -215,39 +305,53 @@ def _defaults(problem: TuningProblem, name: str, set_up: list[Controller]) -> Ve
 
 
 class Part(NamedTuple):
-    """Candidates from number `first` on, each a place for a job of its own."""
+    """Some of the candidates, each a place for a job of its own, and what each has to beat."""
 
-    first: int
+    which: slice
     trials: Trials
     jobs: Indices
     places: Vector
+    most: Vector
+    order: Indices
 
 
-def _costs_of(part: Part) -> Vector:
-    return part.trials.costs(part.jobs, part.places)
+def _raced(part: Part) -> Raced:
+    return part.trials.raced(part.jobs, part.places, part.most, part.order)
 
 
-def shared_costs(trials: Trials, pool: Pool, jobs: Indices, places: Vector) -> Vector:
-    """The costs of candidates, computed by the workers of a pool in any number of parts: the same bits."""
-    most = STARTS_A_THREAD if pool.threads and pool.count > 1 else STARTS_A_CALL
-    size = min(-(-len(jobs) // pool.count), max(most // trials.starts_of.shape[1], 1))
-    parts = (Part(k, trials, jobs[k : k + size], places[k : k + size]) for k in range(0, len(jobs), size))
-    all_costs = np.empty(len(jobs))
-    for part, costs in pool.results(_costs_of, parts):
-        all_costs[part.first : part.first + size] = costs
-    return all_costs
+def race(trials: Trials, pool: Pool, jobs: Indices, places: Vector, most: Vector) -> Raced:
+    """`raced` by the workers of a pool, in any number of parts: the same bits."""
+    order = np.argsort(-trials.decided[jobs], axis=1, kind="stable")
+    room = STARTS_A_THREAD if pool.threads and pool.count > 1 else STARTS_A_CALL
+    size = min(-(-len(jobs) // pool.count), max(room // trials.starts_of.shape[1], 1))
+    each = (slice(k, k + size) for k in range(0, len(jobs), size))
+    parts = (Part(one, trials, jobs[one], places[one], most[one], order[one]) for one in each)
+    costs, deciders, starts = np.empty(len(jobs)), np.empty(len(jobs), dtype=int), 0
+    for part, raced in pool.results(_raced, parts):
+        costs[part.which], deciders[part.which] = raced.costs, raced.deciders
+        starts += raced.starts
+    trials.decided *= MEMORY
+    np.add.at(trials.decided, (jobs, deciders), 1.0)
+    return Raced(costs, deciders, starts)
 
 
 TOO_SLOW = 1e30  # where the costs of candidates begin that start, but not in time
 UNFINISHED = 1e60  # where those begin that do not start at all
 SLACK = 1e-9  # of the bound on the start time, for rounding
+# metrics that begin so
+NEVER_NEGATIVE = ("k_dyn", "peak_torque", "used_torque", "start_time", "settled_time", "damage", MARGIN)
+MEMORY = 0.5  # of what decided candidates, from one generation to the next
 TIE = 1e-6  # share of the metric within which the mean over the starts decides
 
 
 def _within(values: Vector, quantile: float) -> Vector:
     """The share `quantile` of the last axis, rising."""
-    count = max(math.ceil(quantile * np.shape(values)[-1] - 1e-9), 1)
-    return np.sort(values, axis=-1)[..., :count]
+    return np.sort(values, axis=-1)[..., : _kept(np.shape(values)[-1], quantile)]
+
+
+def _kept(count: int, quantile: float) -> int:
+    """How many of so many starts a quantile counts."""
+    return max(math.ceil(quantile * count - 1e-9), 1)
 
 
 def upper(values: Vector, quantile: float) -> Vector:

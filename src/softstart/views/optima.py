@@ -201,7 +201,11 @@ def bound_sentence(best: Optimum) -> str:
         return f"The lower bound of the start time covers {kept.covers}".rstrip(".") + f".{unchecked}"
     if bound.kind == "none":
         return f"No lower bound is known: {bound.covers}" if bound.covers else "No lower bound."
-    return f"The lower bound ({bound.kind}) covers {bound.covers}".rstrip(".") + "."
+    said = f"The lower bound ({bound.kind}) covers {bound.covers}".rstrip(".") + "."
+    once = best.bound_once
+    if once is None or once.k_dyn <= bound.k_dyn:
+        return said
+    return f"{said} That of {number(once.k_dyn, 6)} covers {once.covers}."
 
 
 def optimum_figure(best: Optimum) -> Figure:

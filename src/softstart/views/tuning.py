@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from softstart.controller.parameters import declared_parameters
 from softstart.drive.data_sheet_words import BAND
 from softstart.errors import Sentence
 from softstart.tuning.problem import MARGIN
@@ -39,6 +40,7 @@ PRICES = {
     "schedule_over_optimum": "each cell tuned / optimum",
     "robust_over_optimum": "one set / optimum",
 }
+MOST_DERIVED = 5  # values in a sentence
 SHOWN = 24  # cells on a terminal
 SAME_TIME = 1e-3  # bounds on the start time that differ by less count as one
 
@@ -235,6 +237,24 @@ def conclusions(tuning: Tuning) -> list[str]:
     return [*sentences, f"Ratios of {metric}: {'; '.join(ratios)}."] if ratios else sentences
 
 
+def derived_note(robust: RobustSet) -> str:
+    """What the robust set takes from the nominal drive beside its gains, and how to get the same; else ""."""
+    if not robust.derived:
+        return ""
+    units = {name: one.unit for name, one in declared_parameters(robust.controller.controller).items()}
+    texts = [
+        f"{name} = {value:.5g}{label('', units.get(name, ''), ' ')}" for name, value in robust.derived.items()
+    ]
+    more = f" and {len(texts) - MOST_DERIVED} more (table about.derived)" if len(texts) > MOST_DERIVED else ""
+    gap, inertia = robust.controller.nominal.gap_and_inertia
+    return (
+        f"The set derives from the nominal drive (gap {gap:.4g} rad, J2 {inertia:.4g} kg m2): "
+        f"{', '.join(texts[:MOST_DERIVED])}{more}. In other cells the gains alone derive other values, with "
+        "other results. The same controller everywhere: --controller robust.toml, for an export --gains "
+        "robust.toml, in Python robust.controller (RobustGains)."
+    )
+
+
 def tuning_notes(tuning: Tuning) -> list[str]:
     """What the columns mean, and how reliable the search is."""
     drive, q, price, notes = tuning.drive, tuning.problem, tuning.price, list[str]()
@@ -244,7 +264,7 @@ def tuning_notes(tuning: Tuning) -> list[str]:
         notes.append(f"gap: total backlash at the motor shaft; J2: inertia of {load} at its own shaft.")
     if tuning.robust is not None:
         notes += tuning.robust.controller.controller.doubts(tuning.robust.controller.nominal)
-        notes += [tuning.robust_loop] if tuning.robust_loop else []
+        notes += [one for one in (tuning.robust_loop, derived_note(tuning.robust)) if one]
     if q.soft is not None:
         notes.append(
             Sentence(

@@ -21,7 +21,7 @@ from softstart.start.kernel_input import kernel_input
 
 PROBLEM = Problem(CRANE, LONG)
 GOOD, END, CLAIMED = solve_pulse_coast_hold(PROBLEM)
-PROVED = LowerBound(0.909, "certificate", "one contact")
+PROVED = LowerBound(0.909, "duality", "one contact")
 
 
 def judged(

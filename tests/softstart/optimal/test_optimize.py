@@ -120,8 +120,8 @@ def test_terminals_cost_what_they_ask_for() -> None:
     )
     assert reached.k_dyn <= synchronous.k_dyn * (1 + 1e-6)
     assert synchronous.k_dyn < steady.k_dyn
-    assert steady.bound.kind == "certificate"
-    assert steady.optimality_gap_percent < 0.15
+    assert steady.bound_once is not None
+    assert 0.98 * steady.k_dyn < steady.bound_once.k_dyn <= steady.k_dyn
 
 
 def test_a_heavily_damped_contact_begins_with_a_jump_of_torque() -> None:

@@ -88,16 +88,17 @@ def test_no_strategy_reaches_the_speed():
 
 @pytest.mark.parametrize(("over", "proved"), [(0.99, True), (1.01, False)])
 def test_an_optimum_within_1_percent_of_its_bound_is_proved(hostile, over, proved):
-    """Against every start by the momentum bound; by a certificate among those whose gap closes once."""
+    """Against every start by the momentum bound; by that of starts whose gap closes once among these."""
     time = 1.2 * hostile.choice.direct.run.start_time
     bound = bound_at(hostile.drive, time)
     near = FrontPoint(time, "reached", "OPTIMAL", "", k_dyn=bound * (1.0 + 0.01 * over))
-    far = replace(near, k_dyn=1.2 * bound, k_dyn_lower_bound=1.2 * bound / (1.0 + 0.01 * over))
+    far = replace(near, k_dyn=1.2 * bound)
     every, single, loose = OptimumCurve(points=(near,)).proofs(hostile.drive)
     assert (every or loose) == pytest.approx([over], rel=1e-9)
     assert bool(every) == proved
-    for kind, certain in (("certificate", proved), ("momentum", False)):
-        every, single, loose = OptimumCurve(points=(replace(far, bound_kind=kind),)).proofs(hostile.drive)
+    for once, certain in ((1.2 * bound / (1.0 + 0.01 * over), proved), (None, False)):
+        point = replace(far, k_dyn_lower_bound_once=once)
+        every, single, loose = OptimumCurve(points=(point,)).proofs(hostile.drive)
         assert (every, single) == ([], [(time, pytest.approx(over, rel=1e-9))] if certain else [])
         assert loose == ([] if certain else [pytest.approx(20.0)])
 
@@ -181,12 +182,11 @@ def test_an_optimum_that_is_found_stands_between_bound_and_strategy(monkeypatch)
     assert made.summary()["k_dyn_lowest_known"] == known
 
 
-def test_a_certificate_for_one_contact_is_not_told_as_one_for_every_start(hostile):
+def test_a_bound_for_one_contact_is_not_told_as_one_for_every_start(hostile):
     """Direct start bounces: a bound that covers single contacts says nothing of it."""
     direct = hostile.row("direct").run
     single = FrontPoint(
-        direct.start_time, "reached", "OPTIMAL", "", k_dyn=1.3363, k_dyn_lower_bound=1.3356,
-        bound_kind="certificate",
+        direct.start_time, "reached", "OPTIMAL", "", k_dyn=1.3363, k_dyn_lower_bound_once=1.3356,
     )  # fmt: skip
     points = (*hostile.limit.found, single)
     page = Page(replace(hostile, limit=replace(hostile.limit, points=points)).to_html())

@@ -31,7 +31,7 @@ def searched(problems, seeds, generations, first=None):
     """The last populations of searches at once, one for each problem."""
     seeds = np.broadcast_to(np.array(seeds, dtype=float), (len(problems), *np.shape(seeds)))
 
-    def costs(which, places):
+    def costs(which, places, most):
         return np.array([problems[k](row[None])[0] for k, row in zip(which, places, strict=True)])
 
     begin = populations(costs, seeds, 24, (1,)) if first is None else first
@@ -98,7 +98,7 @@ def test_where_the_worst_start_is_the_same_the_mean_over_all_is_made_small():
     two = np.array([[1.5, 2.0 - 1e-7], [1.2, 2.0], [1.1, 2.01]])
     assert cost(two, np.full((3, 2), 0.2), 0.3, 1.0).argsort().tolist() == [1, 0, 2]
 
-    def costs(which, places):  # K of two starts, one of which no gain changes
+    def costs(which, places, most):  # K of two starts, one of which no gain changes
         k = np.stack([1.0 + np.abs(places - 0.3).sum(axis=1), np.full(len(places), 2.0)], axis=1)
         return cost(k, np.full(k.shape, 0.2), 0.3, 1.0)
 

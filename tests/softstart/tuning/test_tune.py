@@ -3,6 +3,7 @@
 import csv
 import itertools
 import math
+import tomllib
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 from tests.kept import parts_in
 
 from softstart import Command, Drive, InputError, PlainController, optimize, simulate, tune
+from softstart.cli.export import _strategy
 from softstart.controller import controller_class, controller_names, make_controller, parameter
 from softstart.parallel import Pool
 from softstart.start.recommendation import Row
 from softstart.tuning.ranges import tunable_parameters
 from softstart.tuning.trials import Trials
-from softstart.views.tuning import conclusions
+from softstart.views.tuning import conclusions, tuning_notes
 
 CRANE = Drive.load("crane-4amtkf").replace(target_speed=60.0)
 GRID = {"gaps": [0.5, 2.0], "inertias": ["2 J1", "5 J1"]}
@@ -43,14 +45,18 @@ def told(tuning):
 
 
 @pytest.mark.parametrize("name", TUNABLE)
-def test_tuned_per_cell_is_never_worse_than_the_defaults(name):
+def test_tuned_per_cell_is_never_worse_than_the_defaults(name, tmp_path):
     tuned = tune(CRANE, name, **GRID, **(SMALL | {"restarts": 1}))
+    files = {}
+    for what in ("schedule", "robust"):
+        tuned.to_toml(files.setdefault(what, tmp_path / f"{what}.toml"), what)
     for gap in (0.5, 2.0):
         for inertia in (0.07, 0.175):
             cell = tuned.schedule.sel(gap=gap, load_inertia=inertia)
             drive = CRANE.replace(gap=gap, load_inertia=inertia)
             before, after = simulate(drive, name), simulate(drive, tuned.scheduled)
-            # the table holds what the drive does with the schedule, not an echo of the search
+            # the table holds what the drive does with the schedule and its file, not an echo of the search
+            assert simulate(drive, str(files["schedule"])).k_dyn == after.k_dyn
             assert float(cell.k_dyn) == after.k_dyn
             assert float(cell[tuned.problem.time]) == after.limited_time
             assert float(cell.k_dyn_default) == before.k_dyn
@@ -61,7 +67,8 @@ def test_tuned_per_cell_is_never_worse_than_the_defaults(name):
     assert one.feasible
     for gap, inertia in itertools.product((0.5, 2.0), (0.07, 0.175)):
         drive = CRANE.replace(gap=gap, load_inertia=inertia)
-        run, default = simulate(drive, one.controller), simulate(drive, name, fitted_to=CRANE)
+        run, default = simulate(drive, str(files["robust"])), simulate(drive, name, fitted_to=CRANE)
+        assert run.k_dyn == simulate(drive, one.controller).k_dyn
         assert run.k_dyn == pytest.approx(float(one.cells.k_dyn.sel(gap=gap, load_inertia=inertia)), rel=1e-9)
         assert run.limited_time <= default.limited_time * (1.0 + 1e-9)
     assert one.worst == float(one.cells.k_dyn.max())
@@ -268,6 +275,38 @@ def test_a_schedule_is_written_with_few_digits_and_is_what_was_promised(tmp_path
     (row, *_), names = csv.DictReader(table.read_text().splitlines()), found.schedule
     assert float(row["k_dyn"]) == float(f"{float(names['k_dyn'][0, 0]):.6g}")  # figures have six digits
     assert float(row["time"]) == float(names["time"][0, 0])
+
+
+def test_what_one_set_derives_from_the_nominal_drive_stands_beside_its_gains(tmp_path):
+    """The delay of `reduced-two-stage`, half of stage 2, [G](15), follows from the gap.
+
+    In other cells the gains alone have another K_dyn; with the file it is that of the table to the bit.
+    """
+    found = tune(CRANE, "reduced-two-stage", [0.25, 0.5, 1.0], ["1x"], schedule=False, **SMALL)
+    one, path = found.robust, tmp_path / "robust.toml"
+    assert list(one.derived) == ["wait"]
+    alone = make_controller("reduced-two-stage", one.gains)
+    assert one.derived["wait"] == alone.fitted(CRANE).numbers(CRANE)["wait"]
+    found.to_toml(path, "robust")
+    for gap in found.problem.gaps:
+        drive, cell = CRANE.replace(gap=gap), float(one.cells.k_dyn.sel(gap=gap).item())
+        assert simulate(drive, str(path)).k_dyn == simulate(drive, one.controller).k_dyn == cell
+        assert (simulate(drive, alone).k_dyn == cell) == (gap == CRANE.gap)
+    (note,) = [text for text in tuning_notes(found) if "derives from the nominal drive" in text]
+    assert f"wait = {one.derived['wait']:.5g}" in note
+    assert "--gains robust.toml" in note
+    assert found.summary()["robust"]["derived"] == one.derived
+    assert tomllib.loads(path.read_text("utf-8"))["about"]["derived"] == one.derived
+    (exported,) = {_strategy(None, str(path), {}).set_up(CRANE.replace(gap=gap))[0] for gap in (0.25, 1.0)}
+    assert exported.parameters == one.parameters
+
+
+def test_gains_that_are_all_of_a_set_need_no_drive(tmp_path):
+    found = tune(CRANE, "ramp", [0.25, 0.5], ["1x"], schedule=False, **SMALL)
+    assert found.robust.derived == {}
+    assert not [text for text in tuning_notes(found) if "derives from" in text]
+    found.to_toml(tmp_path / "robust.toml", "robust")
+    assert "derived" not in (tmp_path / "robust.toml").read_text("utf-8")
 
 
 # bad input ------------------------------------------------------------------------------------------------
