@@ -235,7 +235,7 @@ def _checked(
     seconds = time.perf_counter() - began
     return Optimum(
         problem, profile, runs, bound, method, why, claimed, end, seconds, heat_at_least=least,
-        tried=(Trial(method, claimed, seconds, ""),), bound_once=once,
+        tried=(Trial(method, claimed, seconds, ""),),
     )  # fmt: skip
 
 
