@@ -49,7 +49,7 @@ primal.set_label("The optimal torque, that of the descent, and the shaft torque 
 # momentum alone leaves much open; there weak duality shows that no torque of a start with one contact is
 # better by more than 0.5 %.
 for start_time in (0.2883042, 0.2522662):
-    best = optimize(drive, start_time, terminal="reached")
+    best = optimize(drive, start_time, terminal="reached", bounds=True)
     momentum = momentum_bound(Problem(drive, start_time, "reached")).k_dyn
     bound = best.bound_once or best.bound
     print(f"{start_time} s: K_dyn {best.k_dyn:.5f}, momentum {momentum:.5f}, {bound.kind} {bound.k_dyn:.5f}")

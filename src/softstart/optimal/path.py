@@ -39,14 +39,15 @@ LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked
 CLOSE = 1.05  # latest time, by the shortest start found: there it is refined
 RUNGS, SPREAD = 9, 0.005  # of the way up: at the shortest time * (1 + spread * (2^k - 1))
 LONG = 1.0, 1.4, 2.0, 3.0  # times a usual start: where an easy one is looked for
-WIDE, NARROW, RISE = 0.1, 1e-3, 0.08  # of the start time: steps down; the rise of K_dyn that is aimed at
+WIDE, NARROW, RISE = 0.1, 2e-3, 0.08  # of the start time: steps down; the rise of K_dyn that is aimed at
+MOST_RISE, LEAST = 0.2, 4e-3  # of K_dyn, above which a step is taken again shorter; the shortest that is
 LEFT = 3  # nodes at which the way down is better in succession: then the way up is left
 BEST, ALIKE = 2, 1.01  # starts that are refined, if they are so near to the best one
 MILD = 1.15  # K_dyn up to which the way down is enough
 FOLLOWS, DEAR = 30, 2e3  # steps from a neighbour, and the penalty up to which they are tried again
 ROUGH = 3e-4  # of K_dyn: how exactly the rungs are found
 BEND = 1e-3  # of the largest torque: what is kept of the knots of a neighbour
-TRIES = 1500  # knots in all starts around one, where one torque serves several machines
+TRIES = 800  # knots in all starts around one, where one torque serves several machines
 STRETCH, BUMPS, HEIGHT = 0.15, 10, 0.15  # of time; their number; of the highest torque
 HOPEFUL = 1.03  # the merit up to which a start around is followed on
 MET = 3e-6  # of a bound on K_dyn, that is left to it
@@ -256,11 +257,12 @@ class Path:
             self.tell(f"start time {latest:.4g} s")
             search = self.descent(latest)
             found = self.followed(search, last) or self.followed(search, *[one.found for one in nodes[-4:-1]])
-            if found is None:
+            rise = math.inf if found is None else math.log(self._figure(found) / self._figure(last))
+            if found is None or (rise > MOST_RISE and step > LEAST):
                 step *= 0.4
                 continue
             nodes.append(Node(latest, found))
-            rise = max(math.log(self._figure(found) / self._figure(last)), 1e-9)
+            rise = max(rise, 1e-9)
             step = min(step * min(max(RISE / rise, 0.5), 2.0), WIDE)
         return nodes
 
