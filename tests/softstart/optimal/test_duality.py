@@ -54,7 +54,7 @@ def random_drive(rng: np.random.Generator) -> Drive:
 
 
 def random_starts(rng: np.random.Generator, drive: Drive) -> Iterator[tuple[Problem, float, int]]:
-    """(problem that a start answers, its K_dyn, changes of contact): target and start time are those of that start."""
+    """(problem that a start answers, K_dyn, changes of contact): target and start time are its own."""
     period, Ms = 2.0 * math.pi / float(drive.Omega), float(drive.Ms)
     n = int(rng.integers(2, 9))
     times = np.append(0.0, np.sort(rng.uniform(0.0, 5.0 * period, n)))
