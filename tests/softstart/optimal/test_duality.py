@@ -21,6 +21,7 @@ from softstart.optimal.pulse_coast_hold import solve_pulse_coast_hold
 from softstart.optimal.starts import DemandSimulator
 from softstart.profile import TorqueProfile
 
+GAP = ("gap closed", "gap opened")
 BASE = Drive.load("crane-4amtkf")
 LATE, GENTLE = 0.30778594119021396, 1.7902284419255463
 
@@ -53,7 +54,7 @@ def random_drive(rng: np.random.Generator) -> Drive:
 
 
 def random_starts(rng: np.random.Generator, drive: Drive) -> Iterator[tuple[Problem, float, int]]:
-    """(problem that a start answers, its K_dyn, closings): target and start time are those of that start."""
+    """(problem that a start answers, K_dyn, changes of contact): target and start time are its own."""
     period, Ms = 2.0 * math.pi / float(drive.Omega), float(drive.Ms)
     n = int(rng.integers(2, 9))
     times = np.append(0.0, np.sort(rng.uniform(0.0, 5.0 * period, n)))
@@ -81,7 +82,7 @@ def answered(
         drive.replace(target_speed=speed * (1.0 - 1e-9)), end * (1.0 + 1e-9), terminal, base=BASE
     )
     whole = replayed(problem, profile, end)[0]
-    closings = [event for event in whole.events if event.kind == "gap closed" and event.time < end]
+    closings = [event for event in whole.events if event.kind in GAP and event.time < end]
     return problem, whole.peak_torque / problem.base_torque, len(closings)
 
 
