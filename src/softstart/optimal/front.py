@@ -300,14 +300,7 @@ def pareto(
     times = None if start_times is None else _seconds(start_times, drive, torque_speed)
     names = ready_controller_names() if controllers is None else controllers
     made = [as_controller(one) for one in names]
-    inputs = {
-        "version of softstart": __version__,
-        "drive": drive.to_toml(),
-        "base drive": base.to_toml() if base else "",
-        "terminal": terminal,
-        "torque-speed limit": [[float(speed), float(torque)] for speed, torque in torque_speed],
-        "smoothness": float(smoothness),
-    }
+    inputs = _inputs(drive, base, terminal, torque_speed, smoothness)
     count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
     target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
     runs = [simulate(drive, one, base=base) for one in made]
@@ -355,6 +348,20 @@ def pareto(
         for run in runs
     ]  # fmt: skip
     return Front(drive, terminal, curve, tuple(beside))
+
+
+def _inputs(
+    drive: Machine, base: Machine | None, terminal: Terminal, torque_speed: Corners, smoothness: float
+) -> dict[str, Any]:
+    """What a file of finished points belongs to."""
+    return {
+        "version of softstart": __version__,
+        "drive": drive.to_toml(),
+        "base drive": base.to_toml() if base else "",
+        "terminal": terminal,
+        "torque-speed limit": [[float(speed), float(torque)] for speed, torque in torque_speed],
+        "smoothness": float(smoothness),
+    }
 
 
 def default_start_times(
