@@ -26,7 +26,7 @@ print(f"{best.method}: P = {P:.4f} N m, K_dyn {best.k_dyn:.6f}")
 # **Closed form and descent.** Pulse, coast, hold is optimal here. The descent from constant torque
 # (successive linear programs on the exact start) does not know this form and finds it.
 search = Descent(problem, best.end_time)
-found = search.down(TorqueProfile([0.0], [search.high]))
+found = search.down(TorqueProfile([0.0], [search.high]), soft=40)
 assert found is not None
 found = search.refined(found)
 print(f"descent: K_dyn {found.peak / problem.base_torque:.6f}")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -113,21 +113,29 @@ def test_values_of_a_chain_by_any_of_their_words() -> None:
     assert "mass[9].inertia" in second
 
 
+class Found(NamedTuple):
+    """What stands for an optimum."""
+
+    gap: float
+    theta0: float
+    k_dyn: float
+
+
 def test_equal_scenarios_have_one_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     """The machine that is also a scenario: names and machines stay together."""
     module = import_module("softstart.optimal.optimize")
-    monkeypatch.setattr(
-        module, "_by_formula", lambda problem, began: (problem.drive.gap, problem.drive.theta0)
-    )
+    monkeypatch.setattr(module, "solve", lambda problem: Found(problem.drive.gap, problem.drive.theta0, 1.0))
     worn = CRANE.replace(gap=2.0)
-    found = module._alone(Problem(CRANE, 0.5, scenarios=(worn, CRANE, worn)))
-    assert found == {"scenario 1": (0.5, 0.0), "scenario 2": (2.0, 0.0)}
+    told = list[str]()
+    found = module._alone(Problem(CRANE, 0.5, scenarios=(worn, CRANE, worn)), told.append)
+    assert found == {"scenario 1": (0.5, 0.0, 1.0), "scenario 2": (2.0, 0.0, 1.0)}
+    assert told == ["scenario 1 alone: K_dyn 1", "scenario 2 alone: K_dyn 1"]
     unknown = worn.replace(load_kind="reactive", start_position="unknown")
-    found = module._alone(Problem(unknown, 0.9, scenarios=(CRANE, unknown)))
+    found = module._alone(Problem(unknown, 0.9, scenarios=(CRANE, unknown)), told.append)
     assert found == {
-        "scenario 1 driving-flank": (2.0, 1.0),
-        "scenario 1 mid-gap": (2.0, 0.0),
-        "scenario 1 opposite-flank": (2.0, -1.0),
-        "scenario 2": (0.5, 0.0),
+        "scenario 1 driving-flank": (2.0, 1.0, 1.0),
+        "scenario 1 mid-gap": (2.0, 0.0, 1.0),
+        "scenario 1 opposite-flank": (2.0, -1.0, 1.0),
+        "scenario 2": (0.5, 0.0, 1.0),
     }
-    assert module._alone(Problem(CRANE, 0.5)) == {"": (0.5, 0.0)}
+    assert module._alone(Problem(CRANE, 0.5), told.append) == {"": (0.5, 0.0, 1.0)}

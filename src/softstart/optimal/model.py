@@ -29,26 +29,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
 from softstart.optimal.program import LinearProgram
+from softstart.optimal.search import BETWEEN, CALM, Found, Search
 from softstart.optimal.starts import DemandRun
-
-if TYPE_CHECKING:
-    from softstart.optimal.descent import Descent, Found
 
 LOW = 0.6  # share of the peak from which rows are known at all
 NEAR, THIN = 0.85, 3  # share of the peak from which rows are in a program; one of so many of them
 ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of the decrease
 CLOSE = 0.25  # of the highest torque below the torque-speed curve: looked at
-BETWEEN = 5e-5  # of the highest torque: kept from the curve for what happens between the instants
 CURVE_TOLERANCE = 1e-4  # of a step, by which the torque may lie beyond the curve in a program
 FARTHEST, TURNS = 1.0, 0.5  # of t_f and of the elastic period, that t_f moves for a unit of trust
-CALM = 1e-5  # weight of the total variation of the torque, in highest torques
 STEP = 4.0  # units of time that a step may move for each unit of trust
 
 
@@ -116,7 +112,7 @@ class Square:
 class Model:
     """The linear model of the starts under the demand of `found`."""
 
-    def __init__(self, search: Descent, found: Found) -> None:
+    def __init__(self, search: Search, found: Found) -> None:
         self.search, self.found = search, found
         problem, self.size = search.problem, found.demand.size
         shafts, curve, ends = [], [], []
@@ -306,7 +302,7 @@ class Model:
 
 
 def _of_shafts(
-    search: Descent, start: DemandRun, t_f: float, least: float
+    search: Search, start: DemandRun, t_f: float, least: float
 ) -> tuple[tuple[Matrix, Vector, NDArray[np.bool_]], Matrix]:
     """|T| of each shaft above `least` over time, as shares of the base torque, and its rows.
 

@@ -17,7 +17,7 @@ from softstart.errors import InputError, SimulationError
 from softstart.optimal import pulse_coast_hold
 from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time
 from softstart.optimal.check import check, replayed
-from softstart.optimal.descent import Descent, Found
+from softstart.optimal.descent import Descent
 from softstart.optimal.path import EDGE, Path
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
 from softstart.optimal.result import (
@@ -30,6 +30,7 @@ from softstart.optimal.result import (
     OptimumError,
     Trial,
 )
+from softstart.optimal.search import Found
 from softstart.optimal.torque_speed import Corners, RigidStart, refuse_weak_curve
 from softstart.parallel import single_threaded_blas
 from softstart.profile import TorqueProfile

@@ -22,8 +22,9 @@ import numpy as np
 
 from softstart.optimal import seeds
 from softstart.optimal.bounds import momentum_shortest_time
-from softstart.optimal.descent import Descent, Found
+from softstart.optimal.descent import Descent
 from softstart.optimal.problem import Objective, Problem
+from softstart.optimal.search import Found
 from softstart.optimal.starts import DemandSimulator
 from softstart.optimal.torque_speed import rigid_start_time
 from softstart.profile import TorqueProfile
@@ -45,7 +46,7 @@ LEFT = 3  # nodes at which the way down is better in succession: then the way up
 BEST, ALIKE = 2, 1.01  # starts that are refined, if they are so near to the best one
 MILD = 1.15  # K_dyn up to which the way down is enough
 FOLLOWS, DEAR = 30, 2e3  # steps from a neighbour, and the penalty up to which they are tried again
-ROUGH = 3e-4  # of K_dyn: how exactly the rungs are found
+ROUGH = 1e-3  # of K_dyn: how exactly the rungs are found
 BEND = 1e-3  # of the largest torque: what is kept of the knots of a neighbour
 TRIES = 800  # knots in all starts around one, where one torque serves several machines
 STRETCH, BUMPS, HEIGHT = 0.15, 10, 0.15  # of time; their number; of the highest torque
@@ -106,7 +107,7 @@ class Path:
             return None
         span = min(1.2 * full.end, latest)
         switching = [TorqueProfile([0.0], [search.high]), *seeds.switching(search, span, SAMPLES)]
-        return self.quickest(search, switching, self.gentle_firsts(search))
+        return self.quickest(search, switching, () if self._gentle else self.gentle_firsts(search))
 
     def quickest(
         self, search: Descent, many: Iterable[TorqueProfile], more: Iterable[TorqueProfile]
@@ -256,10 +257,10 @@ class Path:
             latest, last = nodes[-1].latest * (1.0 - step), nodes[-1].found
             self.tell(f"start time {latest:.4g} s")
             search = self.descent(latest)
-            found = self.followed(search, last) or self.followed(search, *[one.found for one in nodes[-4:-1]])
+            found = self.followed(search, last) or self.followed(search, *[one.found for one in nodes[-2:-1]])
             rise = math.inf if found is None else math.log(self._figure(found) / self._figure(last))
             if found is None or (rise > MOST_RISE and step > LEAST):
-                step *= 0.4
+                step *= 0.3
                 continue
             nodes.append(Node(latest, found))
             rise = max(rise, 1e-9)

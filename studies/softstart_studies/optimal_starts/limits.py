@@ -135,7 +135,7 @@ def descended(gap: float, time: float) -> float:
     0.909
     """
     search = Descent(Problem(crane(gap), time, "reached"), time)
-    found = search.down(TorqueProfile([0.0], [search.high]))
+    found = search.down(TorqueProfile([0.0], [search.high]), soft=40)
     assert found is not None
     return search.refined(found).peak / search.base
 

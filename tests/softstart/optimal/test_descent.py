@@ -11,9 +11,10 @@ from tests.softstart.optimal.drives import CRANE, CURVE, HELD, played, three_mas
 
 from softstart.optimal import pulse_coast_hold, seeds
 from softstart.optimal.demand import Demand
-from softstart.optimal.descent import Descent, Found, least_change
+from softstart.optimal.descent import Descent, least_change
 from softstart.optimal.model import Model
 from softstart.optimal.problem import Problem
+from softstart.optimal.search import Found
 from softstart.optimal.starts import steady_shaft_torques
 
 CASES: dict[str, Problem] = {
