@@ -39,6 +39,7 @@ FIRSTS = 3  # demands that a search begins with
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 CLOSE = 1.05  # latest time, by the shortest start found: there it is refined
 RUNGS, SPREAD = 9, 0.005  # of the way up: at the shortest time * (1 + spread * (2^k - 1))
+DAMPED = 0.05, 0.02, 0.008, 0.003, 0.001  # damping ratios through which an undamped chain is approached
 LONG = 1.0, 1.4, 2.0, 3.0  # times a usual start: where an easy one is looked for
 WIDE, NARROW, RISE = 0.1, 2e-3, 0.08  # of the start time: steps down; the rise of K_dyn that is aimed at
 MOST_RISE, LEAST = 0.2, 4e-3  # of K_dyn, above which a step is taken again shorter; the shortest that is
@@ -136,10 +137,25 @@ class Path:
     def searched(self, search: Descent) -> Found | None:
         """The best start by descents from first demands: closed forms and pulses."""
         firsts = self.gentle_firsts(search)
+        damped = self._damped(search)
+        firsts += [] if damped is None else [damped]
         after = [one for each in firsts if (one := search.step_down(search.play(search.onto(each))))]
         after.sort(key=Found.merit)
         ended = [down for one in after[:2] if (down := search.down(one, least=ROUGH)) and down.near]
         return min(ended, key=Found.merit, default=None)
+
+    def _damped(self, search: Descent) -> TorqueProfile | None:
+        """For an undamped chain the answer with a little damping, which leads to a better one."""
+        one, problem = self.players[0], self.problem
+        if len(self.players) > 1 or one.joints < 2 or one.d.any():
+            return None
+        known = next(iter(self.gentle_firsts(search)), None)
+        for ratio in DAMPED:
+            drive = problem.drive.with_damping_ratio(ratio)
+            damped = Descent(replace(problem, drive=drive, base=problem.base or problem.drive), search.latest)
+            found = None if known is None else damped.down(known, least=ROUGH)
+            known = known if found is None else found.profile.simplified(BEND)
+        return known
 
     def gentle_firsts(self, search: Descent) -> list[TorqueProfile]:
         """First demands of gentle starts: closed forms and pulses."""
@@ -167,14 +183,13 @@ class Path:
         """Whether a start is one whose optimum a single search has."""
         if found is None or not found.near:
             return False
-        one = len(self.players) == 1
-        return one and (self.problem.minimise == "heat" or found.peak <= self.problem.drive.mean_torque)
+        return self.problem.minimise == "heat" or self._calm(found)
 
     def at(self, latest: float, near: TorqueProfile | None = None) -> Found | None:
         """The best start within a time, s; None if there is none. `near` is one more first demand."""
         search = self.descent(latest)
         ended = [] if near is None else [self._ended(search.down(near, least=ROUGH), search)]
-        ended += [self.searched(search)] if len(self.players) == 1 else []
+        ended += [self._widened(search, self.searched(search))]
         if not any(self.easy(one) for one in ended):
             nodes = self._gentle
             gentle = next((one.found for one in nodes if one.latest <= latest), None)
@@ -252,7 +267,8 @@ class Path:
                 break
         if first is None:
             return []
-        nodes, step = [self._widened(first)], WIDE
+        wide = self._widened(self.descent(first.latest), first.found)
+        nodes, step = [Node(first.latest, wide or first.found)], WIDE
         while step > NARROW:
             latest, last = nodes[-1].latest * (1.0 - step), nodes[-1].found
             self.tell(f"start time {latest:.4g} s")
@@ -298,11 +314,9 @@ class Path:
     def _calm(self, found: Found) -> bool:
         return found.peak <= self.problem.drive.mean_torque
 
-    def _widened(self, first: Node) -> Node:
+    def _widened(self, search: Descent, found: Found | None) -> Found | None:
         """The same, or a better one by a wider search where one torque serves several machines."""
-        if len(self.players) == 1:
-            return first
-        return Node(first.latest, self.around(self.descent(first.latest), first.found))
+        return found if found is None or len(self.players) == 1 else self.around(search, found)
 
     def around(self, search: Descent, found: Found) -> Found:
         """The best of local optima around one: its demand stretched in time, or with bumps, and down again.
