@@ -155,6 +155,8 @@ def optimize(
         raise InputError("confirm: the CasADi problem is for one start; give one position and no scenarios.")
     if confirm and minimise == "start_time":
         raise InputError("confirm: the CasADi problem is solved for a given start time; leave it out.")
+    if bounds and (limits or minimise != "k_dyn"):
+        raise InputError("bounds: they are lower bounds on the K_dyn of a start time; leave it out here.")
     known = near.profile if isinstance(near, Optimum) else near
     if limits:
         given = {"start_time": start_time, "k_dyn": k_dyn, "confirm": confirm or None}

@@ -3,8 +3,8 @@
 Near the shortest start time there are many local optima, each with its own contacts. One descent from the
 answer for the next start time keeps to those that it has: from above it keeps what is gentle, from below what
 is quick. So starts are found on the way from an easy long one down and from the shortest one up, always at
-the same times, and the better of both is kept. A start serves every longer time: K_dyn does not rise.
-Where K_dyn is at most 1 one search from first demands has the optimum in all cases known, and is enough.
+the same times, and the better of both is kept, as a start serves every longer time. On the way K_dyn does
+not rise; an answer beside it is a descent of its own. Where K_dyn is at most 1 one search is enough.
 
 The shortest start is a descent on t_f. Its first demands are the quickest of many that switch between the
 limits of the torque at random instants, by their exact starts.
@@ -29,11 +29,7 @@ from softstart.optimal.starts import DemandSimulator
 from softstart.optimal.torque_speed import rigid_start_time
 from softstart.profile import TorqueProfile
 
-SAMPLES, FOLLOWED, FINISHED = (
-    100,
-    10,
-    4,
-)  # first demands of the shortest start: played, a few steps, to the end
+SAMPLES, FOLLOWED, FINISHED = 100, 10, 4  # first demands of the shortest start: played, tasted, to the end
 ROUGHLY = 0.3  # what is missed, beside the time, in the order of first demands
 FIRSTS = 3  # demands that a search begins with
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for

@@ -123,6 +123,12 @@ def test_terminals_cost_what_they_ask_for() -> None:
     assert 0.98 * steady.k_dyn < steady.bound_once.k_dyn <= steady.k_dyn
 
 
+@pytest.mark.parametrize("given", [{"minimise": "heat", "start_time": 0.3}, {"limits": True}])
+def test_bounds_are_refused_where_they_would_say_nothing(given: Any) -> None:
+    with pytest.raises(InputError, match="bounds: they are lower bounds on the K_dyn"):
+        optimize(CRANE.replace(permissible_torque=60.0), bounds=True, **given)
+
+
 def test_a_heavily_damped_contact_begins_with_a_jump_of_torque() -> None:
     """T(0+) = d v is the peak here: the gap has to be crossed slowly."""
     best = kept(optimize(CRANE.replace(damping=20.0), 0.35, terminal="reached"))
