@@ -82,9 +82,13 @@ def test_an_interrupted_search_goes_on_and_takes_no_other_duty(tmp_path: Any) ->
 
 @pytest.mark.slow
 def test_processes_find_the_same_bits_and_damage_is_a_metric() -> None:
+    """In 1.1 of the time of direct: any seed has 0.8 of the damage or less; in their own time the defaults
+
+    leave next to nothing, which takes a longer search to find.
+    """
     duty = Duty([DutyStep("start"), DutyStep("stop", by="coast")])
     options = {**SMALL, "duty": duty, "free": ["initial", "time"], "metric": "damage", "robust": False}
-    grid = {"gaps": [0.07, 0.14], "inertias": ["1x"]}
+    grid = {"gaps": [0.07, 0.14], "inertias": ["1x"], "start_time": "1.1x"}
     alone = tune(CONVEYOR, "ramp", **grid, **options)
     both = tune(CONVEYOR, "ramp", **grid, **{**options, "workers": 2})
     assert alone.schedule is not None
@@ -93,7 +97,7 @@ def test_processes_find_the_same_bits_and_damage_is_a_metric() -> None:
     cell = alone.schedule.isel(gap=0, load_inertia=0)
     gains = {name: cell[name].item() for name in ("initial", "time")}
     run = run_duty(CONVEYOR, "ramp", duty, parameters=gains)
-    assert run.life().worst.damage == cell.damage.item() < 0.95 * cell.damage_default.item()
+    assert run.life().worst.damage == cell.damage.item() < 0.85 * cell.damage_default.item()
 
 
 @pytest.mark.parametrize(
