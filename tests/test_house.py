@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 43460, "tests": 29759}
+MOST = {"src, controllers": 43459, "tests": 29778}
 LONGEST_FILE = 560  # statements
 LONGEST_FUNCTION = 70  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef

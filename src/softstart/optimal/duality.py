@@ -18,7 +18,6 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -55,8 +54,7 @@ from softstart.optimal.starts import parts
 Span = tuple[float, float]
 
 WITHIN = 5e-4  # the work ends once the bound is within this share of what is judged
-SECONDS = 10.0  # of processor time, this share for starts that close once, the rest for all others
-FOR_ONCE = 0.5
+CELLS = 24_000  # in linear programs, a half of them for starts that close once: some 0.4 ms each
 PARTS = 400  # of the ends of a box, of each of which is known what is proved
 PROGRAMS = 12  # for one box at most
 PER_PERIOD, LONG, EDGE = 18, 3.0, 4.0  # cells of a period; longer ones where T is held, so far from events
@@ -104,13 +102,13 @@ def _not_covered(problem: Problem, machine: Any) -> str:
 
 
 def dual_bounds(
-    problem: Problem, k_dyn: float, end: float | None = None, *, seconds: float = SECONDS
+    problem: Problem, k_dyn: float, end: float | None = None, *, cells: int = CELLS
 ) -> tuple[LowerBound, LowerBound]:
     """Lower bounds on K_dyn for any number of contacts, and for starts whose gap closes once.
 
     Both hold for every start that ends at the start time, or `end` in s, or before. `k_dyn` is what is to be
-    judged: the work ends once a bound is within 5e-4 of it, or after so many seconds of processor time. Where
-    nothing is better the momentum bound.
+    judged: the work ends once a bound is within 5e-4 of it, or after linear programs with so many cells in
+    all: a count, so that equal requests have equal bounds. Where nothing is better the momentum bound.
 
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
     >>> for bound in dual_bounds(Problem(drive.replace(torque_lag=0.002), 0.2883042), 0.9237):
@@ -129,7 +127,7 @@ def dual_bounds(
         left = [i for i in (0, 1) if best[i].k_dyn < k_dyn * (1.0 - WITHIN)]
         if not left or whole.kind == "none":
             break
-        found = _Search(problem, machine, k_dyn).both(seconds / len(problem.machines))
+        found = _Search(problem, machine, k_dyn).both(cells // len(problem.machines))
         for i, peak in enumerate(found):
             if peak * float(machine.Ms) / problem.base_torque > best[i].k_dyn:
                 best[i] = LowerBound(
@@ -188,17 +186,17 @@ class _Search:
         self.tail = self.kernel() * (not (m.pulls and m.sticks))
         if m.sticks:  # the load moves on until then
             self.tail = min(self.tail, 0.99 * m.W / (m.mu2 * m.mc))
-        self.after, self.until = self.coasting(), 0.0
+        self.after, self.left = self.coasting(), 0
 
-    def both(self, seconds: float) -> tuple[float, float]:
+    def both(self, cells: int) -> tuple[float, float]:
         """(any number of contacts, those that close once): the least P, in Ms."""
         m = self.model
-        self.until = time.thread_time() + FOR_ONCE * seconds
+        self.left = cells // 2
         once = self.least(self.boxes([None], False), self.goal)
         parted: list[Span | None] = [] if m.joined else [(0.0, math.inf)]
         if not m.sticks and not parted:
             return once, once
-        self.until = time.thread_time() + (1.0 - FOR_ONCE) * seconds
+        self.left = cells // 2
         more = self.boxes([None, *parted] if m.sticks else parted, m.sticks)
         return min(once, self.least(more, min(once, self.goal))), once
 
@@ -273,13 +271,13 @@ class _Search:
         return found
 
     def least(self, boxes: list[Box], goal: float) -> float:
-        """The least bound over all boxes, or what is known of it where it is above the goal or time is up."""
+        """The least bound over all boxes; what is known of it above the goal or when the work is done."""
         tie = itertools.count()
         heap = [(self.plain(box), next(tie), box, False) for box in boxes]
         heapq.heapify(heap)
         while heap:
             value, _, box, done = heapq.heappop(heap)
-            if value >= goal or time.thread_time() > self.until:
+            if value >= goal or self.left <= 0:
                 return value
             if not done:
                 low, box = self.judged(box, goal)
@@ -299,9 +297,10 @@ class _Search:
         edges = np.linspace(low, high, PARTS + 1)
         for _ in range(PROGRAMS):
             k = PARTS - 1 - int(np.argmin(known[::-1]))
-            if known[k] >= goal or time.thread_time() > self.until:
+            if known[k] >= goal or self.left <= 0:
                 break
             at = layout(self, box, float(edges[k + 1]))
+            self.left -= len(at.cells) - at.before
             if (by := good_multipliers(self.model, at)) is None:
                 break
             times, bound = proved(self.model, at, by)
@@ -395,8 +394,8 @@ def layout(search: _Search, box: Box, begin: float) -> Layout:
             t += h
             one = phase._replace(length=h)
             if phase.shaft == "free":
-                # T cannot rise more quickly after an opening, as z' is limited
-                rise = m.quickest * (t - at.o0 + m.d)
+                # T cannot rise more quickly once all have opened, as z' is limited
+                rise = m.quickest * (t - at.o0 + m.d) if t - h >= at.o1 else 1.0
                 late = -1.0 if at.o0 >= at.c1 else at.most
                 one = one._replace(most=min(1.0, rise), joins=joins, begin=late if joins else -1.0)
                 joins = False

@@ -369,9 +369,9 @@ class _Program:
         return Multipliers(np.maximum(-inner, 0.0), terminal, found)
 
 
-OPTIONS: dict[str, bool | float | str] = {  # with presolve many of these programs fail
+OPTIONS: dict[str, bool | int | str] = {  # with presolve many of these programs fail
     "output_flag": False, "presolve": "off", "run_crossover": "off", "threads": 1,
-    "time_limit": 3.0,
+    "ipm_iteration_limit": 200, "simplex_iteration_limit": 10_000,
 }  # fmt: skip
 
 

@@ -28,8 +28,8 @@ LATE, GENTLE = 0.30778594119021396, 1.7902284419255463
 
 @pytest.fixture
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A small part of the time, and a coarse grid: less is proved, and all of it holds."""
-    monkeypatch.setattr(duality, "SECONDS", 0.3)
+    """A small part of the work, and a coarse grid: less is proved, and all of it holds."""
+    monkeypatch.setattr(duality, "CELLS", 700)
     monkeypatch.setattr(duality, "PER_PERIOD", 9)
 
 
@@ -88,10 +88,11 @@ def answered(
 
 def judged(problem: Problem, k_dyn: float, closings: int) -> float:
     """The bound for any number of contacts; none is above the start that it covers."""
-    every, once = dual_bounds(problem, k_dyn, seconds=duality.SECONDS)
+    drive: Any = problem.drive
+    every, once = dual_bounds(problem, 1.05 * k_dyn, cells=duality.CELLS)  # the work does not end below it
     assert momentum_bound(problem).k_dyn <= every.k_dyn <= once.k_dyn
     assert every.k_dyn <= k_dyn * (1.0 + 1e-7)
-    if closings <= 1 and "moving on" not in once.covers:
+    if closings <= (drive.theta0 < 0.5 * drive.gap) and "moving on" not in once.covers:
         assert once.k_dyn <= k_dyn * (1.0 + 1e-7)
     return every.k_dyn
 
@@ -109,7 +110,7 @@ def test_no_start_is_below(seed: int, quick: None) -> None:
 def search(problem: Problem, k_dyn: float) -> tuple[float, float]:
     """Both bounds without that of momentum."""
     drive: Any = problem.drive
-    found = duality._Search(problem, drive, k_dyn).both(4.0)
+    found = duality._Search(problem, drive, k_dyn).both(10_000)
     return tuple(peak * float(drive.Ms) / problem.base_torque for peak in found)  # type: ignore[return-value]
 
 
@@ -117,8 +118,9 @@ def search(problem: Problem, k_dyn: float) -> tuple[float, float]:
 def test_it_reaches_the_closed_form(terminal: Any) -> None:
     problem = Problem(CRANE, 0.2883042, terminal)
     k_dyn = solve_pulse_coast_hold(problem)[2]
-    for bound in search(problem, 1.002 * k_dyn):  # so that the work does not end below it
-        assert (1.0 - 1e-3) * k_dyn < bound <= k_dyn
+    every, once = search(problem, 1.002 * k_dyn)  # so that the work does not end below it
+    assert (1.0 - 1e-3) * k_dyn < once <= k_dyn
+    assert (1.0 - 1e-2) * k_dyn < every <= once
 
 
 def test_it_is_close_where_momentum_is_far() -> None:
@@ -129,17 +131,42 @@ def test_it_is_close_where_momentum_is_far() -> None:
         start_position="opposite-flank", target_speed=1296.6271754117,
     )  # fmt: skip
     problem = Problem(drive, LATE, "reached")
-    every, once = dual_bounds(problem, GENTLE, seconds=6.0)
+    every, once = dual_bounds(problem, GENTLE, cells=15_000)
     assert momentum_bound(problem).k_dyn < every.k_dyn < 0.56 * GENTLE + 0.44 * once.k_dyn
     assert 0.93 * GENTLE < once.k_dyn <= GENTLE
     assert once.kind == every.kind == "duality"
     assert "whose gap closes once and stays closed until the target speed is reached" in once.covers
 
 
+def test_equal_requests_have_equal_bounds() -> None:
+    """To the bit, although the work ends before the bound is near: it is counted, not timed."""
+    drive = CRANE.replace(torque_lag=0.004, damping=0.5)
+    one, other = (dual_bounds(Problem(drive, 0.28), 3.0, cells=700) for _ in range(2))
+    assert one == other
+    assert one[1].kind == "duality"
+    assert one[1].k_dyn < 2.9
+
+
+def test_an_opening_may_come_late_within_its_cell(quick: None) -> None:
+    """T is then still near its peak at the beginning of the cell; a start with a gap open at its end."""
+    drive = Drive(
+        motor_inertia=0.015613823810083367, load_inertia=0.13431133446918767, stiffness=26.43538388865564,
+        gap=2.6610126291600964, load_torque=6.181728341684564, starting_torque=142.54834700875472,
+        start_position="opposite-flank", target_speed=1.0,
+    )  # fmt: skip
+    profile = TorqueProfile.steps([0.0, 0.02596, 0.031, 0.2], [float(drive.Ms), 0.0, float(drive.Ms)])
+    run = DemandSimulator(drive).play(profile, 0.2).trajectory
+    end = brentq(lambda t: float(np.diff(run.at([t])["w"][0])[0]), 0.14, 0.17, xtol=1e-14)
+    problem, k_dyn, changes = answered(drive, run, profile, "synchronous", end)
+    assert changes == 2
+    for share in (1.02, 1.3):
+        assert dual_bounds(problem, share * k_dyn, cells=2000)[0].k_dyn <= k_dyn
+
+
 def test_more_time_lowers_it(quick: None) -> None:
     """As the ends of all sooner starts are among those of the later."""
     drive = CRANE.replace(torque_lag=0.004, damping=0.5)
-    bounds = [dual_bounds(Problem(drive, time), 3.0, seconds=0.3)[1].k_dyn for time in (0.27, 0.28, 0.3)]
+    bounds = [dual_bounds(Problem(drive, time), 3.0, cells=700)[1].k_dyn for time in (0.27, 0.28, 0.3)]
     assert bounds[0] > 1.01 * bounds[1] > 1.02 * bounds[2]
 
 
@@ -157,7 +184,7 @@ def test_units_do_not_matter(kind: str) -> None:
         duality._Search(Problem(each, t), each, 0.93) for each, t in ((drive, 0.29), (quick, 0.029))
     )
     for search in (one, other):
-        search.until = math.inf
+        search.left = 10**9
     boxes = [[*search.boxes([None], False)] for search in (one, other)]
     for a, b in list(zip(*boxes, strict=True))[:3]:
         low, high = (search.judged(box, 9.0)[0] for search, box in ((one, a), (other, b)))
@@ -183,8 +210,6 @@ def test_momentum_is_left_where_it_does_not_cover(given: dict[str, Any], why: st
 
 def test_several_machines_have_the_largest(quick: None) -> None:
     gaps = [CRANE.replace(gap=gap) for gap in (0.25, 0.5)]
-    alone = [
-        dual_bounds(Problem(gap, 0.29, "reached", base=CRANE), 1.4, seconds=0.4)[0].k_dyn for gap in gaps
-    ]
-    both = dual_bounds(Problem(gaps[0], 0.29, base=CRANE, scenarios=(gaps[1],)), 1.4, seconds=0.8)[0].k_dyn
+    alone = [dual_bounds(Problem(gap, 0.29, "reached", base=CRANE), 1.4, cells=1000)[0].k_dyn for gap in gaps]
+    both = dual_bounds(Problem(gaps[0], 0.29, base=CRANE, scenarios=(gaps[1],)), 1.4, cells=2000)[0].k_dyn
     assert both > 0.9 * max(alone)
