@@ -43,12 +43,6 @@ def read_start_times(text: str, option: str = "--start-times") -> list[StartTime
     return [StartTime(*pair) for pair in options.read_value_list(text, option, read)]
 
 
-def _start_time(text: str, option: str) -> str:
-    """The text as it is, if it is one of a start time."""
-    StartTime.of(text, option)
-    return text
-
-
 def _each(unit: str) -> options.Reader:
     """Reads quantities with commas between; "... at output" is read later."""
 
@@ -77,18 +71,18 @@ def _corners(text: str, option: str) -> list[tuple[float, float]]:
 @contextmanager
 def _no_solution() -> Iterator[None]:
     """Where there is no optimum: its verdict as the JSON object, one sentence, and exit code 3."""
-    from softstart.optimal.result import InfeasibleError, OptimumError
+    from softstart.optimal.result import InfeasibleError
 
     try:
         yield
-    except (InfeasibleError, OptimumError) as error:
-        if option_value("as_json") and isinstance(error, InfeasibleError):
+    except InfeasibleError as error:
+        if option_value("as_json"):
             print_json(error.verdict.summary())
-        raise SimulationError(str(error)) from error
+        raise
 
 
 @command("optimize")
-@option("--start-time", _start_time)
+@option("--start-time", StartTime.of)
 @option("--limits", is_flag=True)
 @option("--terminal", type=click.Choice(TERMINALS))
 @option("--minimise", type=click.Choice(OBJECTIVES))
@@ -174,8 +168,6 @@ def _runs_beside(best: Optimum) -> list[Run]:
 @option("--terminal", type=click.Choice(TERMINALS), default="reached")
 @option("--torque-speed", _corners)
 @options.controller_option("--controllers", several=True)
-@option("--workers", options.count(), default="1")
-@options.scheduler_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def pareto_command(
@@ -198,8 +190,6 @@ def pareto_command(
         reached.
     --controllers A,B,...
         Controllers to compare with the curve. Default: all that need no parameter.
-    --workers N
-        Number of optima computed in parallel. Default: 1.
     --out DIR
         Write figure (SVG, PNG), table (CSV) and report.md into this folder. Finished points are saved at
         once, so that an interrupted command resumes.

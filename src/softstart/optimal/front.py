@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 
@@ -23,8 +23,6 @@ from softstart.optimal.path import Path as StartPath
 from softstart.optimal.problem import Problem, StartTime, Terminal
 from softstart.optimal.result import InfeasibleError, Optimum, OptimumError
 from softstart.optimal.torque_speed import Corners, refuse_weak_curve
-from softstart.parallel import Pool, checked_workers
-from softstart.profile import TorqueProfile
 from softstart.results import OneLine, Result
 from softstart.start.demand import ControllerLike, as_controller
 from softstart.start.recommendation import SLOW
@@ -38,7 +36,6 @@ COMPARISON_TERMINAL: Terminal = (
     "reached"  # a controller is judged by the instant its load has the target speed
 )
 SHORT, LONG, COUNT = 1.02, 1.6, 12
-CHUNKS = 2  # stretches of start times for each worker
 COLUMNS = (
     "what", "start_time_bound", "start_time", "k_dyn", "k_dyn_lower_bound", "bound_kind", "gap_percent",
     "optimal_k_dyn", "ratio", "heat", "contacts", "method", "status",
@@ -95,11 +92,6 @@ class FrontPoint(OneLine):
         figures = {**(every := best.summary()), **every["profile"], "status": "OPTIMAL", "status_text": ""}
         figures["start_time_bound"] = start_time
         return cls.of_record({name: figures[name] for name in cls.__dataclass_fields__ if name in figures})
-
-    @property
-    def profile(self) -> TorqueProfile:
-        """The torque over time of a point that was found."""
-        return TorqueProfile(self.time, self.torque)
 
     def summary(self) -> dict[str, Any]:
         """The figures under the names used everywhere."""
@@ -180,13 +172,9 @@ class Front(Result, view="optima.front_sheet"):
     @property
     def shortest_start_time(self) -> float:
         """Shortest feasible start time in s, known if a start time was too short; else NaN."""
-        judged = [one.optimum for one in self.controllers if one.optimum is not None]
-        known = [
-            point.shortest_start_time
-            for point in (*self.points, *judged)
-            if point.shortest_start_time is not None and point.terminal == self.terminal
-        ]
-        return known[0] if known else math.nan
+        points = (*self.points, *(one.optimum for one in self.controllers))
+        known = (p.shortest_start_time for p in points if p is not None and p.terminal == self.terminal)
+        return next((shortest for shortest in known if shortest is not None), math.nan)
 
     @property
     def gentlest(self) -> ControllerPoint | None:
@@ -240,9 +228,6 @@ def pareto(
     base: Machine | None = None,
     save_to: str | Path | None = None,
     progress: Progress | None = None,
-    each: Callable[[FrontPoint], object] | None = None,
-    workers: int = 1,
-    scheduler: str | None = None,
 ) -> Front:
     """Find the least K_dyn for each of several bounds on the start time, with its lower bound.
 
@@ -256,7 +241,8 @@ def pareto(
         The machine, or its name or file.
     start_times : sequence of float or str, optional
         Bounds on the start time: in s, with a unit ("300 ms"), or as multiples of the start time of `direct`
-        ("1.2x"); by default `default_start_times(drive, terminal)`.
+        ("1.2x"); by default 12 from 1.02 of the shortest found to 1.6 of that of `direct`, closer together
+        towards the short end, where the curve is steep.
     terminal, torque_speed, smoothness, base : optional
         As in `optimize`.
     controllers : sequence of str, Controller or torque over time, optional
@@ -264,12 +250,8 @@ def pareto(
         `reached`; by default all installed controllers that run without being given a parameter.
     save_to : str or path, optional
         A file in which each finished point is kept at once, and from which a second call takes it.
-    progress, each : callable, optional
-        Called with a text before each point that is computed; with each point, those of controllers too.
-    workers : int
-        Processes of this machine; by default all is computed in this one.
-    scheduler : str, optional
-        Address of a dask scheduler whose workers compute instead.
+    progress : callable, optional
+        Called with a text before each point that is computed.
 
     Returns
     -------
@@ -283,7 +265,7 @@ def pareto(
     OptimumError
         If not a single point could be computed.
     SimulationError
-        If the start under a controller cannot be finished, or workers cannot go on.
+        If the start under a controller cannot be finished.
 
     Examples
     --------
@@ -293,175 +275,106 @@ def pareto(
     >>> [round(point.k_dyn, 4) for point in front.points]
     [0.9092, 0.8081]
     """
-    options: dict[str, Any] = {"torque_speed": torque_speed, "smoothness": smoothness, "base": base}
-    options["base"] = base = Problem(drive, 1.0, terminal, **options).base
-    drive = as_machine(drive)
+    problem = Problem(drive, 1.0, terminal, torque_speed=torque_speed, smoothness=smoothness, base=base)
+    drive, base, torque_speed = as_machine(drive), problem.base, problem.torque_speed
     tell = progress or (lambda doing: None)
     times = None if start_times is None else _seconds(start_times, drive, torque_speed)
     names = ready_controller_names() if controllers is None else controllers
     made = [as_controller(one) for one in names]
-    inputs = _inputs(drive, base, terminal, torque_speed, smoothness)
-    count = checked_workers(None if scheduler is not None and workers == 1 else workers, scheduler)
     target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
     runs = [simulate(drive, one, base=base) for one in made]
-    paths = {end: StartPath(Problem(drive, 1.0, end, **options)) for end in (terminal, COMPARISON_TERMINAL)}
+    paths = {end: StartPath(replace(problem, terminal=end)) for end in (terminal, COMPARISON_TERMINAL)}
     if times is None:
         tell("looking for the shortest start time")
-        times = default_start_times(
-            drive, terminal, torque_speed=torque_speed, smoothness=smoothness, path=paths[terminal]
-        )
+        times = _usual_times(paths[terminal], drive)
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
-    found: dict[tuple[str, float], FrontPoint] = {}
-    with (
-        PartStore(target, inputs, ["terminal", "start_time_bound"]) as saved,
-        Pool(
-            count, scheduler=scheduler, describe=TimeRange.__str__, kept="Finished points are kept."
-        ) as pool,
-    ):
-        for ending in dict.fromkeys([terminal, COMPARISON_TERMINAL]):
-            points: dict[float, FrontPoint] = {}
-            asked = {*(times if ending == terminal else ()), *(own if ending == COMPARISON_TERMINAL else ())}
-            known = {t: FrontPoint.of_record(one) for t in asked if (one := saved.find(ending, t))}
-            for point in _points(
-                TimeRange(drive, options, ending, tuple(sorted(asked, reverse=True))),
-                known,
-                pool,
-                tell,
-                paths[ending],
-            ):
-                t = point.start_time_bound
-                if point is not known.get(t) and point.status != "NOT_FOUND":  # another attempt may find it
-                    saved.add(asdict(point))
-                if each is not None and t not in points:
-                    each(point)
-                points[t] = point
-            found |= {(ending, t): point for t, point in _monotone(list(points.values()))}
-    curve = tuple(found[terminal, t] for t in times)
-    failed = [point.status_text for point in curve if point.status == "NOT_FOUND"]
-    if failed and not any(point.found for point in curve):
-        raise OptimumError(failed[0])
-    beside = [
-        ControllerPoint(
-            run.controller_name, run.k_dyn, run.start_time, run.status.value,
-            found.get((COMPARISON_TERMINAL, run.start_time)),
-        )
-        for run in runs
-    ]  # fmt: skip
-    return Front(drive, terminal, curve, tuple(beside))
-
-
-def _inputs(
-    drive: Machine, base: Machine | None, terminal: Terminal, torque_speed: Corners, smoothness: float
-) -> dict[str, Any]:
-    """What a file of finished points belongs to."""
-    return {
+    inputs = {
         "version of softstart": __version__,
         "drive": drive.to_toml(),
         "base drive": base.to_toml() if base else "",
         "terminal": terminal,
-        "torque-speed limit": [[float(speed), float(torque)] for speed, torque in torque_speed],
+        "torque-speed limit": [list(corner) for corner in torque_speed],
         "smoothness": float(smoothness),
     }
+    wanted = [*((terminal, t) for t in times), *((COMPARISON_TERMINAL, t) for t in own)]
+    with PartStore(target, inputs, ["terminal", "start_time_bound"]) as saved:
+        found = {
+            end: _points(path, [t for ending, t in wanted if ending == end], saved, tell)
+            for end, path in paths.items()
+        }
+    curve = tuple(found[terminal][t] for t in times)
+    failed = [point.status_text for point in curve if point.status == "NOT_FOUND"]
+    if failed and not any(point.found for point in curve):
+        raise OptimumError(failed[0])
+    judged = found[COMPARISON_TERMINAL]
+    beside = tuple(
+        ControllerPoint(
+            run.controller_name, run.k_dyn, run.start_time, run.status.value, judged.get(run.start_time)
+        )
+        for run in runs
+    )
+    return Front(drive, terminal, curve, beside)
 
 
-def default_start_times(
-    drive: Machine, terminal: Terminal = "reached", count: int = COUNT, *, path: StartPath | None = None,
-    **options: Any,
-) -> list[float]:  # fmt: skip
-    """`count` start times in s, from 1.02 of the shortest found to 1.6 of that of `direct`.
-
-    Closer together towards the short end, where the curve is steep. `options` go to `Problem`.
-    """
-    problem = Problem(drive, 1.0, terminal, **options)
-    refuse_weak_curve(problem)
-    quickest = (path or StartPath(problem)).shortest
-    if quickest is None:
+def _usual_times(path: StartPath, drive: Machine) -> list[float]:
+    """Start times in s, from 1.02 of the shortest found to 1.6 of that of `direct`."""
+    refuse_weak_curve(path.problem)
+    if path.shortest is None:
         raise OptimumError("No start time was found at which there is an optimum; name some to be tried.")
-    shortest, direct = quickest.end, simulate(drive, "direct").start_time
+    shortest, direct = path.shortest.end, simulate(drive, "direct").start_time
     longest = LONG * (direct if LONG * direct > 1.2 * shortest else shortest)  # direct may never get there
-    share = np.linspace(0.0, 1.0, count) ** 2
+    share = np.linspace(0.0, 1.0, COUNT) ** 2
     times: list[float] = (SHORT * shortest + (longest - SHORT * shortest) * share).tolist()
     return times
 
 
-class TimeRange(NamedTuple):
-    """Start times that follow each other, long ones first."""
-
-    drive: Machine
-    options: dict[str, Any]
-    terminal: Terminal
-    start_times: tuple[float, ...] = ()
-
-    def __str__(self) -> str:
-        return f"the optima for start times of {self.start_times[-1]:.5g} s to {self.start_times[0]:.5g} s"
-
-    def problem(self, start_time: float) -> Problem:
-        """The problem of one start time."""
-        return Problem(self.drive, start_time, self.terminal, **self.options)
-
-    def point(self, start_time: float, path: StartPath) -> FrontPoint:
-        """The point of one start time; `path` has the starts that are known at others."""
-        try:
-            return FrontPoint.of_optimum(solve(self.problem(start_time), path=path), start_time)
-        except InfeasibleError as error:
-            shortest = error.verdict.shortest_start_time
-            return FrontPoint(
-                start_time, self.terminal, "INFEASIBLE", str(error),
-                shortest_start_time=shortest if math.isfinite(shortest) else None,
-            )  # fmt: skip
-        except OptimumError as error:
-            return FrontPoint(start_time, self.terminal, "NOT_FOUND", str(error))
-
-
-def computed(
-    asked: TimeRange, known: Mapping[float, FrontPoint], tell: Progress = lambda doing: None,
-    path: StartPath | None = None,
-) -> Iterator[FrontPoint]:  # fmt: skip
-    """The points of a stretch but those that are known."""
-    path = path or StartPath(asked.problem(1.0))
-    for number, t in enumerate(asked.start_times):
-        if t not in known:
-            tell(f"start time {number + 1} of {len(asked.start_times)}: {t:.5g} s, {asked.terminal}")
-            yield asked.point(t, path)
-
-
-def _listed(asked: TimeRange) -> list[FrontPoint]:
-    return list(computed(asked, {}))  # a generator does not leave its process
-
-
 def _points(
-    asked: TimeRange, known: dict[float, FrontPoint], pool: Pool, tell: Progress, path: StartPath
-) -> Iterator[FrontPoint]:
-    """The points kept before, then the others; stretches of them by several workers."""
-    yield from sorted(known.values(), key=lambda one: -one.start_time_bound)
-    if pool.count == 1 and pool.scheduler is None:
-        yield from computed(asked, known, tell, path)
-        return
-    missing = tuple(t for t in asked.start_times if t not in known)
-    size = max(1, math.ceil(len(missing) / (CHUNKS * pool.count)))
-    parts = [asked._replace(start_times=missing[i : i + size]) for i in range(0, len(missing), size)]
-    for part, points in pool.results(_listed, parts):
-        tell(str(part))
-        yield from points
+    path: StartPath, start_times: Iterable[float], saved: PartStore, tell: Progress
+) -> dict[float, FrontPoint]:
+    """The points by start time, long ones first; those saved before are not computed again."""
+    problem, points = path.problem, list[FrontPoint]()
+    asked = sorted(set(start_times), reverse=True)
+    for number, t in enumerate(asked, start=1):
+        if record := saved.find(problem.terminal, t):
+            points.append(FrontPoint.of_record(record))
+            continue
+        tell(f"start time {number} of {len(asked)}: {t:.5g} s, {problem.terminal}")
+        points.append(front_point(replace(problem, start_time=t), path))
+        if points[-1].status != "NOT_FOUND":  # another attempt may find it
+            saved.add(asdict(points[-1]))
+    return {point.start_time_bound: point for point in _monotone(points)}
 
 
-def _monotone(points: Sequence[FrontPoint]) -> Iterator[tuple[float, FrontPoint]]:
+def front_point(problem: Problem, path: StartPath) -> FrontPoint:
+    """The point of one problem; `path` has the starts that are known at other times."""
+    assert problem.start_time is not None
+    try:
+        return FrontPoint.of_optimum(solve(problem, path=path), problem.start_time)
+    except InfeasibleError as error:
+        shortest = error.verdict.shortest_start_time
+        return FrontPoint(
+            problem.start_time, problem.terminal, "INFEASIBLE", str(error),
+            shortest_start_time=shortest if math.isfinite(shortest) else None,
+        )  # fmt: skip
+    except OptimumError as error:
+        return FrontPoint(problem.start_time, problem.terminal, "NOT_FOUND", str(error))
+
+
+def _monotone(points: Iterable[FrontPoint]) -> Iterator[FrontPoint]:
     """The points, none above one of a shorter start time: a start may arrive early."""
     gentlest: FrontPoint | None = None
     for point in sorted(points, key=lambda one: one.start_time_bound):
         known = math.inf if point.k_dyn is None else point.k_dyn
         if gentlest is None or gentlest.k_dyn is None or known <= gentlest.k_dyn:
             gentlest = point if point.found else gentlest
-            yield point.start_time_bound, point
+            yield point
         else:
-            early = replace(
-                gentlest,
-                start_time_bound=point.start_time_bound,
-                why=f"the start for {gentlest.start_time_bound:.6g} s is gentler, and may arrive early",
-                seconds=point.seconds,
-            )
-            bounds = ("k_dyn_lower_bound", "bound_kind", "bound_covers", "k_dyn_lower_bound_once")
-            yield point.start_time_bound, replace(early, **{name: getattr(point, name) for name in bounds})
+            own = (
+                "start_time_bound", "seconds", "k_dyn_lower_bound", "bound_kind", "bound_covers",
+                "k_dyn_lower_bound_once",
+            )  # fmt: skip
+            why = f"the start for {gentlest.start_time_bound:.6g} s is gentler, and may arrive early"
+            yield replace(gentlest, why=why, **{name: getattr(point, name) for name in own})
 
 
 def _seconds(
@@ -472,7 +385,7 @@ def _seconds(
     if not times:
         raise InputError("start_times: the list is empty; give at least one start time in s.")
     wrong, direct = Mistakes(), cache(lambda: start_time_of_direct(drive, torque_speed))
-    bounds = []
+    bounds = list[StartTime]()
     for time in times:
         with wrong.collect():
             bounds.append(StartTime.of(time, "start_times"))

@@ -142,13 +142,12 @@ def optimize(
     Biegler, Math. Prog. 106 (2006), doi 10.1007/s10107-004-0559-y. CasADi: Andersson et al., Math. Prog.
     Comp. 11 (2019), doi 10.1007/s12532-018-0139-4.
     """
-    machine = as_machine(drive)
+    began, machine = time.perf_counter(), as_machine(drive)
     usual = start_time is None and minimise != "start_time" and not limits
     asked_for = USUAL if usual else None if start_time is None else StartTime.of(start_time)
-    corners = tuple((float(speed), float(torque)) for speed, torque in torque_speed)
     some = None if asked_for is None and not limits else 1.0  # any: what is wrong with the rest is said first
     problem = Problem(
-        machine, some, terminal, minimise, k_dyn, heat, corners, smoothness, base, tuple(scenarios)
+        machine, some, terminal, minimise, k_dyn, heat, torque_speed, smoothness, base, tuple(scenarios)
     )
     refuse_weak_curve(problem)
     if confirm and len(problem.machines) > 1:
@@ -165,69 +164,66 @@ def optimize(
             raise InputError(
                 [f"{name}: limits asks for the least start time; leave this out." for name in wrong]
             )
-        return _within_limits(problem)
+        return replace(_within_limits(problem), seconds=time.perf_counter() - began)
     if asked_for is not None:
-        end = asked_for.seconds(lambda: start_time_of_direct(machine, corners))
+        end = asked_for.seconds(lambda: start_time_of_direct(machine, problem.torque_speed))
         problem = replace(problem, start_time=end)
     tell = progress or (lambda doing: None)
     asked = len(problem.machines) > 1 and near is None and problem.start_time is not None
     alone = _alone(problem, tell) if asked else {}
     why = f"; no start time given: {asked_for} that of direct" if usual else ""
     try:
-        best = solve(problem, known, confirm, Path(problem, tell))
+        best = solve(problem, known, Path(problem, tell))
     except InfeasibleError:
         if not usual or terminal is not None or problem.terminal == "reached":
             raise
-        problem = replace(problem, terminal="reached")
-        best = solve(problem, known, confirm)
+        best = solve(replace(problem, terminal="reached"), known)
         why += ", in which only the load can have the target speed"
-    best = replace(best, why=best.why + why, alone=alone)
-    return _bounded(best) if bounds else best
+    if confirm:
+        best = _confirmed(best)
+    if bounds:
+        best = _bounded(best)
+    return replace(best, why=best.why + why, alone=alone, seconds=time.perf_counter() - began)
 
 
 @single_threaded_blas
-def solve(
-    problem: Problem, near: TorqueProfile | None = None, confirm: bool = False, path: Path | None = None
-) -> Optimum:
+def solve(problem: Problem, near: TorqueProfile | None = None, path: Path | None = None) -> Optimum:
     """The optimum of a problem; see `optimize`. `path` has the starts that are known at other times."""
     began = time.perf_counter()
-    if problem.minimise == "start_time":
-        return _least_start_time(problem, began)
-    assert problem.start_time is not None
     refuse_weak_curve(problem)
-    path = path or Path(problem)
-    if problem.start_time < momentum_shortest_time(problem):
-        raise _too_short(problem, path)
-    best = _by_formula(problem, began)
-    if best is None:
-        found = path.at(problem.start_time, near)
-        if found is None:
-            raise _too_short(problem, path)
-        best = _answer(problem, found, began)
-    if confirm:
-        best = _confirmed(best)
+    shortest = problem.minimise == "start_time"
+    best = _least_start_time(problem) if shortest else _in_time(problem, near, path or Path(problem))
     return replace(best, seconds=time.perf_counter() - began)
 
 
-def _by_formula(problem: Problem, began: float) -> Optimum | None:
-    if pulse_coast_hold.applies(problem):
-        return None
+def _in_time(problem: Problem, near: TorqueProfile | None, path: Path) -> Optimum:
+    """The optimum within a start time."""
+    assert problem.start_time is not None
+    if problem.start_time < momentum_shortest_time(problem):
+        raise _too_short(problem, path)
+    if best := _by_formula(problem):
+        return best
+    if found := path.at(problem.start_time, near):
+        return _answer(problem, found)
+    raise _too_short(problem, path)
+
+
+def _by_formula(problem: Problem) -> Optimum | None:
     try:
         profile, end, k_dyn = pulse_coast_hold.solve_pulse_coast_hold(problem)
     except pulse_coast_hold.NotApplicable:
         return None
-    return _checked(problem, profile, end, k_dyn, "closed-form", "pulse, coast, hold is optimal here", began)
+    return _checked(problem, profile, end, k_dyn, "closed-form", "pulse, coast, hold is optimal here")
 
 
-def _answer(problem: Problem, found: Found, began: float, why: str = SUCCESSIVE) -> Optimum:
+def _answer(problem: Problem, found: Found, why: str = SUCCESSIVE, method: Method = "descent") -> Optimum:
     claimed = {"k_dyn": found.peak / problem.base_torque, "heat": found.heat, "start_time": found.end}
-    return _checked(problem, found.profile, found.end, claimed[problem.minimise], "descent", why, began)
+    return _checked(problem, found.profile, found.end, claimed[problem.minimise], method, why)
 
 
 def _checked(
-    problem: Problem, profile: TorqueProfile, end: float, claimed: float, method: Method, why: str,
-    began: float,
-) -> Optimum:  # fmt: skip
+    problem: Problem, profile: TorqueProfile, end: float, claimed: float, method: Method, why: str
+) -> Optimum:
     """An answer that has passed the exact machine, with its bound."""
     runs = replayed(problem, profile, end)
     bound = momentum_bound(
@@ -235,10 +231,9 @@ def _checked(
     )
     check(problem, profile, runs, end, claimed, bound)
     least = least_heat(problem) if problem.minimise == "heat" else 0.0
-    seconds = time.perf_counter() - began
     return Optimum(
-        problem, profile, runs, bound, method, why, claimed, end, seconds, heat_at_least=least,
-        tried=(Trial(method, claimed, seconds, ""),),
+        problem, profile, runs, bound, method, why, claimed, end, heat_at_least=least,
+        tried=(Trial(method, claimed),),
     )  # fmt: skip
 
 
@@ -263,7 +258,7 @@ def _alone(problem: Problem, tell: Progress) -> dict[str, Optimum]:
     found = {}
     for machine, name in names.items():
         one = replace(problem, drive=machine, base=problem.base or problem.drive, scenarios=())
-        with suppress(InfeasibleError, OptimumError, SimulationError):
+        with suppress(SimulationError):
             found[name] = solve(one)
             tell(f"{name} alone: K_dyn {found[name].k_dyn:.4g}")
     return found
@@ -273,22 +268,19 @@ def _confirmed(best: Optimum) -> Optimum:
     """The better of an answer and that of the CasADi problem, which has only its order of contacts."""
     from softstart.optimal import statement
 
-    problem, began = best.problem, time.perf_counter()
+    problem = best.problem
     assert problem.start_time is not None
     try:
         claim = statement.solve_collocation(problem, whole_run(best), straight=True)
         search = Descent(problem, problem.start_time)
         found = search.play(search.onto(claim.profile), min(claim.end_time, search.latest))
-        found = None if found is None else search.finished(found)
+        found = found and search.finished(found)
         if found is None:
             raise OptimumError("its demand could not be simulated.")
-        value = {"k_dyn": found.peak / search.base, "heat": found.heat}[problem.minimise]
-        why = f"gentler than {best.method}"
-        other = _checked(problem, found.profile, found.end, value, "collocation", why, began)
+        other = _answer(problem, found, f"gentler than {best.method}", "collocation")
     except (InputError, NotConverged, OptimumError) as failed:
-        trial = Trial("collocation", None, time.perf_counter() - began, str(failed))
-        return replace(best, tried=(*best.tried, trial))
-    tried = (*best.tried, Trial("collocation", claim.value, time.perf_counter() - began, ""))
+        return replace(best, tried=(*best.tried, Trial("collocation", None, str(failed))))
+    tried = (*best.tried, Trial("collocation", claim.value))
     return replace(other if other.minimised < best.minimised else best, tried=tried)
 
 
@@ -349,40 +341,34 @@ def _too_short(problem: Problem, path: Path) -> InfeasibleError:
         f"and none takes less than {least:.6g} s."
     )
     profile = None if found is None else found.profile
-    return InfeasibleError(Infeasibility(problem, shortest, sentence, least, profile))
+    return InfeasibleError(Infeasibility(problem, sentence, shortest, least, profile))
 
 
-def _least_start_time(problem: Problem, began: float) -> Optimum:
+def _least_start_time(problem: Problem) -> Optimum:
     """The shortest start, or the shortest one within the K_dyn allowed."""
-    found, at_least, quicker = _shortest_within(problem, began)
+    found, at_least, quicker = _shortest_within(problem)
     bound = Limit("K_dyn", "1", "k_dyn", problem.k_dyn)
     margins = () if problem.k_dyn is None else (Margin(bound, found.k_dyn, ""),)
     refused = None if quicker is None else Margin(bound, quicker.peak / problem.base_torque, "")
-    return replace(found, kept=_kept(found, Limits(), at_least, refused, margins))
+    return replace(found, kept=Kept(margins, at_least, "", refused))
 
 
-def _shortest_within(problem: Problem, began: float) -> tuple[Optimum, float, Found | None]:
+def _shortest_within(problem: Problem) -> tuple[Optimum, float, Found | None]:
     """The shortest start within the K_dyn allowed, the time that momentum asks for, and what is quicker."""
-    refuse_weak_curve(problem)
     at_least = momentum_shortest_time(problem)
     if problem.k_dyn is not None:
         timed = replace(problem, k_dyn=None, minimise="k_dyn", start_time=1.0)
         at_least = _soonest(timed, problem.k_dyn)
-        exact = _by_formula(replace(timed, start_time=at_least * (1.0 + TINY)), began)
+        exact = _by_formula(replace(timed, start_time=at_least * (1.0 + TINY)))
         if exact is not None and exact.k_dyn <= problem.k_dyn:
             return replace(exact, problem=problem, claimed=exact.end_time), at_least, None
     path = Path(replace(problem, k_dyn=None))
     if path.shortest is None:
-        sentence = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
-        raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
+        said = f"start_time: no start of {problem.drive.name} to {problem.target:g} rad/s was found."
+        raise InfeasibleError(Infeasibility(problem, said))
     if problem.k_dyn is None or path.shortest.peak <= problem.k_dyn * problem.base_torque:
-        best = _answer(
-            problem,
-            path.gentlest(path.shortest, path.shortest.end * (1.0 + EDGE)),
-            began,
-            f"the shortest start found; {SUCCESSIVE}",
-        )
-        return best, at_least, None
+        gentlest = path.gentlest(path.shortest, path.shortest.end * (1.0 + EDGE))
+        return _answer(problem, gentlest, f"the shortest start found; {SUCCESSIVE}"), at_least, None
     found, quicker = path.quickest_within(problem.k_dyn)
     if found is None:
         least = quicker.peak / problem.base_torque
@@ -390,13 +376,12 @@ def _shortest_within(problem: Problem, began: float) -> tuple[Optimum, float, Fo
             f"limits: no start of {problem.drive.name} with a K_dyn of {problem.k_dyn:.4g} was found; the "
             f"gentlest one found has {least:.4g}."
         )
-        raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
-    return _answer(problem, found, began), at_least, quicker
+        raise InfeasibleError(Infeasibility(problem, sentence))
+    return _answer(problem, found), at_least, quicker
 
 
 def _within_limits(problem: Problem) -> Optimum:
     """The first start time whose gentlest start keeps the permissible shaft torque and the life."""
-    began = time.perf_counter()
     limits = checked_limits(problem.drive)
     if limits.shaft_torque is None and limits.life is None:
         raise InputError(
@@ -405,19 +390,20 @@ def _within_limits(problem: Problem) -> Optimum:
         )
     most = None if limits.shaft_torque is None else limits.shaft_torque / problem.base_torque
     timed = replace(problem, start_time=None, minimise="start_time", k_dyn=most)
-    best, at_least, quicker = _shortest_within(timed, began)
+    best, at_least, quicker = _shortest_within(timed)
     refused = next(
         (Margin(one, quicker.peak, "") for one in limits.each if quicker and one.figure == "peak_torque"),
         None,
     )
     if limits.life is not None:
-        best, refused = _that_lasts(problem, best, replace(limits, start_time=None), refused, began)
-    best = replace(best, problem=problem, claimed=best.k_dyn, seconds=time.perf_counter() - began)
-    return replace(best, kept=_kept(best, limits, at_least, refused))
+        best, refused = _that_lasts(problem, best, replace(limits, start_time=None), refused)
+    margins = Row(best.run, None, worst_case=()).margins(limits)
+    kept = Kept(margins, at_least, unchecked_life(problem.drive), refused)
+    return replace(best, problem=problem, claimed=best.k_dyn, kept=kept)
 
 
 def _that_lasts(
-    problem: Problem, best: Optimum, limits: Limits, refused: Margin | None, began: float
+    problem: Problem, best: Optimum, limits: Limits, refused: Margin | None
 ) -> tuple[Optimum, Margin | None]:
     """The first start that also keeps the life, at a time after that of `best`.
 
@@ -437,7 +423,7 @@ def _that_lasts(
         end = math.sqrt(low * high) if found else 1.2 * low
         timed = replace(problem, start_time=end)
         tried = [path.at(end), None if found is None else path.followed(path.descent(end), found)]
-        answers = [_answer(timed, one, began) for one in tried if one is not None]
+        answers = [_answer(timed, one) for one in tried if one is not None]
         one = max(answers, key=lambda each: tightest(each).share)
         tight = tightest(one)
         if tight.share >= 0.0:
@@ -450,7 +436,7 @@ def _that_lasts(
             sentence = (
                 f"limits: no start of {problem.drive.name} that keeps them was found up to {end:.4g} s."
             )
-            raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
+            raise InfeasibleError(Infeasibility(problem, sentence))
     return best, refused
 
 
@@ -470,20 +456,12 @@ def _soonest(problem: Problem, most: float) -> float:
             sentence = (
                 f"limits: no start of {problem.drive.name} has a K_dyn below {least:.4g} within {high:.4g} s."
             )
-            raise InfeasibleError(Infeasibility(problem, math.inf, sentence))
+            raise InfeasibleError(Infeasibility(problem, sentence))
         high *= 2.0
     while high - low > 1e-12 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if too_hard(middle) else (low, middle)
     return high
-
-
-def _kept(
-    best: Optimum, limits: Limits, at_least: float, refused: Margin | None = None, more: Sequence[Margin] = ()
-) -> Kept:
-    margins = (*Row(best.run, None, worst_case=()).margins(limits), *more)
-    unchecked = unchecked_life(best.problem.drive) if limits.shaft_torque or limits.life else ""
-    return Kept(margins, at_least, unchecked, refused)
 
 
 # several machines ------------------------------------------------------------------------------------------
@@ -530,14 +508,16 @@ def scenarios_of(
     5
     """
     drive = as_machine(drive)
-    given = {"gap": gaps, "load_inertia": inertias, "load_torque": load_torques}
-    names = dict(zip(given, ("gaps", "inertias", "load_torques"), strict=True))
-    axes = {key: _values(drive, key, names[key], values) for key, values in given.items()}
-    used = {name: values for name, values in axes.items() if values}
-    grid = [
-        drive.with_values(dict(zip(used, each, strict=True))) for each in itertools.product(*used.values())
-    ]
-    return tuple(dict.fromkeys((drive, *(grid if used else ()))))
+    read = {
+        "gap": _values(drive, "gap", "gaps", gaps),
+        "load_inertia": _values(drive, "load_inertia", "inertias", inertias),
+        "load_torque": _values(drive, "load_torque", "load_torques", load_torques),
+    }
+    axes = {key: values for key, values in read.items() if values}
+    grid = (
+        drive.with_values(dict(zip(axes, each, strict=True))) for each in itertools.product(*axes.values())
+    )
+    return tuple(dict.fromkeys((drive, *grid)))
 
 
 def _values(drive: Machine, key: str, name: str, given: Iterable[float | str]) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -62,37 +62,7 @@ class StartTime:
         return f"{self.value:g}x" if self.multiple else f"{self.value:g} s"
 
 
-def usual_terminal(machine: Any, several: bool = False) -> Terminal:
-    """How an optimal start ends if nobody says: `synchronous` for one start of two masses, else `reached`.
-
-    >>> from softstart import Drive
-    >>> usual_terminal(Drive.load("crane-4amtkf"))
-    'synchronous'
-    """
-    two = len(machine.mass_names) == 2 and len(machine.positions) == 1 and not several
-    return "synchronous" if two else "reached"
-
-
 USUAL = StartTime(1.2, multiple=True)  # where a bound is needed and none is given
-REACTS = (  # what is to be said beside a best fixed profile
-    "It is one torque over time for every start position: feedback reacts to the contact, and its K_dyn can "
-    "be lower."
-)
-
-
-def best_start(machine: Any) -> str:
-    """What the best torque over time is called: no optimum where the position is unknown, as feedback reacts.
-
-    >>> from softstart import Drive
-    >>> best_start(Drive.load("crane-4amtkf")), best_start(Drive.load("long-travel-3kw"))
-    ('optimum', 'best fixed profile')
-    """
-    return "best fixed profile" if len(machine.positions) > 1 else "optimum"
-
-
-def best_k_dyn(machine: Any) -> str:
-    """What its K_dyn is called."""
-    return "K_dyn of the best fixed profile" if len(machine.positions) > 1 else "minimum K_dyn"
 
 
 @dataclass(frozen=True)
@@ -122,7 +92,7 @@ class Problem:
     start_time : float, optional
         Bound on t_f, s; None only where the start time is minimised.
     terminal : {"synchronous", "steady", "reached"}, optional
-        What holds at t_f; by default `usual_terminal`.
+        What holds at t_f; by default `synchronous` for one start of two masses, else `reached`.
     minimise : {"k_dyn", "heat", "start_time"}
         `heat` is the integral of (u/Ms)^2 from 0 to t_f in s, u the realised torque.
     k_dyn, heat : float, optional
@@ -155,7 +125,7 @@ class Problem:
     minimise: Objective = "k_dyn"
     k_dyn: float | None = None
     heat: float | None = None
-    torque_speed: tuple[tuple[float, float], ...] = ()
+    torque_speed: Any = ()  # pairs of numbers once it is read
     smoothness: float = 0.0
     base: Any = None
     scenarios: tuple[Any, ...] = ()
@@ -188,19 +158,22 @@ class Problem:
             )
         if not _number(self.smoothness) or not 0.0 <= float(self.smoothness) < math.inf:
             wrong.append(f"smoothness = {self.smoothness!r}: a weight in s, 0 or more.")
-        wrong += _check_corners(self.torque_speed)
+        wrong += self._wrong_corners()
         several = len(self.scenarios) > 0
         for number, machine in enumerate((self.drive, *self.scenarios), start=1):
             about = f"scenario {number}: " if several else ""
             wrong += [about + sentence for sentence in _wrong_with(machine)]
         if not wrong:
-            object.__setattr__(self, "terminal", self.terminal or usual_terminal(self.drive, several))
+            two = len(self.drive.mass_names) == 2 and len(self.machines) == 1
+            object.__setattr__(self, "terminal", self.terminal or ("synchronous" if two else "reached"))
             wrong += self._wrong_together()
         if wrong:
             raise InputError(wrong)
 
     def _wrong_together(self) -> Iterator[str]:
         """What does not go together."""
+        from softstart.optimal.starts import parts
+
         if len(self.machines) > 1 and self.terminal != "reached":
             yield (
                 f"terminal = {self.terminal}: one torque over time for several machines or start positions "
@@ -212,7 +185,7 @@ class Problem:
                 f"{self.highest_torque:g} N m at most; leave one of them out."
             )
         for machine in self.machines:
-            given, masses = _rows(machine)
+            given, masses, _ = parts(machine)
             taken = float((masses["Mc"] + masses["active"])[int(given.machine.load)])
             if len(self.machines) > 1 and taken >= self.highest_torque:
                 yield (
@@ -223,6 +196,31 @@ class Problem:
                 yield f"terminal = {self.terminal}: a mass stays at rest; ask for reached."
             if self.terminal == "steady" and given.curves.size:
                 yield "terminal = steady: load curves leave no steady torque; ask for reached or synchronous."
+
+    def _wrong_corners(self) -> Iterator[str]:
+        """What is wrong with the torque-speed curve, whose corners become pairs of numbers."""
+        try:
+            points = tuple((float(speed), float(torque)) for speed, torque in self.torque_speed)
+        except (TypeError, ValueError):
+            yield f"torque_speed = {self.torque_speed!r}: give corners (speed in rad/s, torque in N m)."
+            return
+        object.__setattr__(self, "torque_speed", points)
+        shown = f"torque_speed = {points!r}"
+        slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points) if b[0] > a[0]]
+        if len(points) == 1 or len(slopes) < len(points) - 1:
+            yield f"{shown}: give two corners or more, in order of rising speed."
+        elif any(not math.isfinite(number) for point in points for number in point):
+            yield f"{shown}: give finite numbers."
+        elif low := next((point for point in points if point[1] < 0.0), None):
+            yield (
+                f"{shown}: {low[1]:g} N m at {low[0]:g} rad/s: a limit of the torque is 0 or more; end the "
+                "curve where it comes to 0."
+            )
+        elif any(b > a + 1e-12 * abs(a) for a, b in pairwise(slopes)):
+            yield (
+                f"{shown}: this curve bends upward, so the best torque could not be proved best; give a "
+                "concave one (each piece falls at least as steeply as the one before)."
+            )
 
     @cached_property
     def machines(self) -> tuple[Any, ...]:
@@ -255,12 +253,6 @@ class Problem:
         """The mean shaft torque in N m to which K_dyn refers."""
         return float((self.base or self.drive).mean_torque)
 
-    def lower_bound(self) -> Any:
-        """The momentum bound on K_dyn of every start; see `softstart.optimal.bounds.momentum_bound`."""
-        from softstart.optimal.bounds import momentum_bound
-
-        return momentum_bound(self)
-
     def casadi(self, run: Run | None = None) -> Any:
         """The problem as one nonlinear program of CasADi, for your own solver, options or sensitivities.
 
@@ -277,30 +269,13 @@ class Problem:
         >>> nlp = problem.casadi()
         >>> quiet = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": False}
         >>> solver = casadi.nlpsol("s", "ipopt", nlp.nlp, quiet)
-        >>> out = solver(x0=nlp.x0, p=nlp.p, lbx=nlp.lbx, ubx=nlp.ubx, lbg=nlp.lbg, ubg=nlp.ubg)
-        >>> round(nlp.k_dyn(out["x"]), 2)
+        >>> round(nlp.solution(solver(**nlp.arguments)["x"]).value, 2)
         0.91
         """
         from softstart.optimal.optimize import solve, whole_run
         from softstart.optimal.statement import as_casadi
 
         return as_casadi(self, run or whole_run(solve(self)), straight=True)
-
-    @property
-    def ideal_torque(self) -> bool:
-        """True where any measurable torque within the limits can be had: no lag, rate, curve or smoothing."""
-        given = _rows(self.machines[0])[0].machine
-        slow = given.lag > 0.0 or math.isfinite(given.rate)
-        return not (slow or self.torque_speed or self.smoothness > 0.0)
-
-
-def _rows(machine: Any) -> tuple[Any, Any]:
-    """The machine as rows of the kernel, and its masses by names."""
-    from softstart.kernel.records import MASS
-    from softstart.start.kernel_input import kernel_input
-
-    given = kernel_input(machine)
-    return given, given.masses[0].view(MASS)[:, 0]
 
 
 def _without_delay(machine: Machine) -> Machine:
@@ -316,10 +291,11 @@ def _wrong_with(machine: Any) -> Iterator[str]:
         missing = "[motor]" if machine.motor is None else "target_speed"
         yield f"{missing} is missing: an optimal start needs one; add it to the chain."
         return
-    from softstart.kernel.records import CURVE, SHAFT
+    from softstart.kernel.records import CURVE
+    from softstart.optimal.starts import parts
 
-    given, masses = _rows(next(iter(machine.positions.values())))
-    if given.shafts.view(SHAFT)["rigid"].any():
+    given, masses, shafts = parts(next(iter(machine.positions.values())))
+    if shafts["rigid"].any():
         yield (
             "[shaft] rigid: the torque of a rigid shaft in an impact is infinite, and no start has a least "
             "peak; give it a stiffness."
@@ -342,30 +318,3 @@ def _wrong_with(machine: Any) -> Iterator[str]:
 
 def _number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _check_corners(corners: Sequence[Sequence[float]]) -> list[str]:
-    """What is wrong with a torque-speed curve."""
-    if not corners:
-        return []
-    shown = f"torque_speed = {corners!r}"
-    try:
-        points = [(float(speed), float(torque)) for speed, torque in corners]
-    except (TypeError, ValueError):
-        return [f"{shown}: give corners (speed in rad/s, torque in N m)."]
-    if len(points) < 2 or any(b[0] <= a[0] for a, b in pairwise(points)):
-        return [f"{shown}: give two corners or more, in order of rising speed."]
-    if any(not math.isfinite(number) for point in points for number in point):
-        return [f"{shown}: give finite numbers."]
-    if low := next((point for point in points if point[1] < 0.0), None):
-        return [
-            f"{shown}: {low[1]:g} N m at {low[0]:g} rad/s: a limit of the torque is 0 or more; end the curve "
-            "where it comes to 0."
-        ]
-    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(points)]
-    if any(b > a + 1e-12 * abs(a) for a, b in pairwise(slopes)):
-        return [
-            f"{shown}: this curve bends upward, so the best torque could not be proved best; give a concave "
-            "one (each piece falls at least as steeply as the one before)."
-        ]
-    return []

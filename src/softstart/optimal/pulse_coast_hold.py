@@ -41,9 +41,10 @@ class Course:
     peak: float
 
 
-@dataclass(frozen=True)
 class PulseCoastHoldStarts:
-    """The starts of one drive and all that follows from their peak P: SI units, z0 < 0 while the gap is open.
+    """The starts of one drive under at most Ms N m, and all that follows from their peak P; no damping.
+
+    SI units; z0 < 0 while the gap is open, w2 is the first load speed, v0 the first rate of z.
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60)
@@ -53,51 +54,22 @@ class PulseCoastHoldStarts:
     (0.00757, 0.02171, 0.03592)
     """
 
-    J1: float
-    J2: float
-    c: float
-    Mc: float
-    Ms: float
-    z0: float
-    v0: float
-    w2: float
+    def __init__(self, drive: Drive, Ms: float) -> None:
+        self.J1, self.J2, self.c, self.Mc = map(float, (drive.J1, drive.J2, drive.c, drive.Mc))
+        self.Ms, self.w2 = Ms, float(drive.initial_load_speed)
+        self.v0 = float(drive.initial_motor_speed) - self.w2
+        self.z0 = float(drive.theta0 - 0.5 * drive.gap)
+        self.travel, self.preload = max(-self.z0, 0.0), max(self.z0, 0.0)  # of the gap; of the flanks
+        self.Omega = math.sqrt(self.c / self.J1 + self.c / self.J2)
+        self.pull, self.push = self.Mc / self.J2, Ms / self.J1  # b and Ms/J1: by the load, by full torque
+        self.most_held = self.mean(Ms)
+        self.least_peak = self.peak(0.0)  # without any motor torque; 0 where the gap never closes by itself
+        self.full_peak = self.peak(Ms)  # no start has a larger one on its first way up
 
     @classmethod
     def of(cls, problem: Problem) -> PulseCoastHoldStarts:
-        """Those of a problem; damping is left out."""
-        return cls.of_drive(problem.drive.two_masses, problem.highest_torque)
-
-    @classmethod
-    def of_drive(cls, drive: Drive, Ms: float) -> PulseCoastHoldStarts:
-        """Those of a drive under at most Ms N m; damping is left out."""
-        z0, v0 = drive.theta0 - 0.5 * drive.gap, drive.initial_motor_speed - drive.initial_load_speed
-        given = drive.J1, drive.J2, drive.c, drive.Mc, Ms, z0, v0, drive.initial_load_speed
-        return cls(*map(float, given))
-
-    @property
-    def Omega(self) -> float:
-        """Elastic frequency, rad/s."""
-        return math.sqrt(self.c / self.J1 + self.c / self.J2)
-
-    @property
-    def pull(self) -> float:
-        """b: relative acceleration by the load alone, rad/s^2."""
-        return self.Mc / self.J2
-
-    @property
-    def push(self) -> float:
-        """Relative acceleration by the full motor torque alone, rad/s^2."""
-        return self.Ms / self.J1
-
-    @property
-    def travel(self) -> float:
-        """What is open of the gap at first, rad."""
-        return max(-self.z0, 0.0)
-
-    @property
-    def preload(self) -> float:
-        """Overlap of the flanks at first, rad."""
-        return max(self.z0, 0.0)
+        """Those of a problem."""
+        return cls(problem.drive.two_masses, problem.highest_torque)
 
     def mean(self, u: float) -> float:
         """Shaft torque that the motor torque u holds, and about which T swings under it, N m."""
@@ -108,20 +80,9 @@ class PulseCoastHoldStarts:
         v = math.sqrt(self.v0**2 + 2.0 * (u / self.J1 + self.pull) * self.travel)
         return self.mean(u) + math.hypot(self.c * self.preload - self.mean(u), self.c * v / self.Omega)
 
-    @property
-    def most_held(self) -> float:
-        """The largest shaft torque that Ms holds, N m."""
-        return self.mean(self.Ms)
-
-    @property
-    def least_peak(self) -> float:
-        """Peak of T without any motor torque, N m; 0 where the gap never closes by itself."""
-        return self.peak(0.0)
-
-    @property
-    def full_peak(self) -> float:
-        """Peak of T under full torque, N m: no start has a larger one on its first way up."""
-        return self.peak(self.Ms)
+    def held(self, P: float) -> float:
+        """u_eq(P): the motor torque that holds the shaft torque P, N m."""
+        return (P * (self.J1 + self.J2) - self.Mc * self.J1) / self.J2
 
     def course(self, P: float) -> Course:
         """The start of peak P >= least_peak."""
@@ -212,11 +173,6 @@ def reactive(drive: Drive) -> bool:
     return bool(drive.reactive_torque > 0.0 and drive.rests)
 
 
-def falls_rubbing(drive: Drive) -> bool:
-    """Whether the load falls through the gap against friction, which stops it once more after the contact."""
-    return bool(drive.reactive_torque > 0.0 and not drive.rests)
-
-
 def first_true(reasons: Mapping[str, bool]) -> str:
     """The first reason that applies; empty if none does."""
     return next((why for why, is_so in reasons.items() if is_so), "")
@@ -234,10 +190,11 @@ def falls_back(problem: Problem) -> str:
 
 def off_course(problem: Problem) -> str:
     """Why the speed limit does not hold even for an undamped shaft; empty if it does."""
+    drive = problem.drive
     held = {
-        "a brake holds the motor at first": problem.drive.brake != "none",
-        "the load is reactive, friction holds it at rest": reactive(problem.drive),
-        "friction stops the load between falling and rising": falls_rubbing(problem.drive),
+        "a brake holds the motor at first": drive.brake != "none",
+        "the load is reactive, friction holds it at rest": reactive(drive),
+        "friction stops the load between falling and rising": drive.reactive_torque > 0.0 and not drive.rests,
     }
     return first_true(held) or falls_back(problem)
 
@@ -299,7 +256,7 @@ def solve_pulse_coast_hold(problem: Problem) -> tuple[TorqueProfile, float, floa
         )
     course = starts.course(P)
     end = _end(starts, course, P, target, problem.start_time)
-    held = (P * (starts.J1 + starts.J2) - starts.Mc * starts.J1) / starts.J2
+    held = starts.held(P)
     if end < course.t_peak and problem.terminal == "synchronous":
         raise NotApplicable(
             f"the load has its target speed at {end:g} s, before the shaft torque is at its peak."

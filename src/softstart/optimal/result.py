@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from softstart.arrays import Vector
+from softstart.errors import SimulationError
 from softstart.kernel import records as rec
 from softstart.optimal.problem import Problem
 from softstart.profile import TorqueProfile
@@ -49,12 +50,11 @@ class LowerBound:
 
 @dataclass(frozen=True)
 class Trial:
-    """A search: its minimised figure on the exact plant, its computing time in s, and why it failed."""
+    """A search: its minimised figure on the exact plant, or why it failed."""
 
     method: Method
     value: float | None
-    seconds: float
-    failure: str
+    failure: str = ""
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class Optimum(Result, view="optima.optimum_sheet"):
     why: str
     claimed: float
     end_time: float
-    seconds: float
+    seconds: float = 0.0
     alone: Mapping[str, Optimum] = field(default_factory=dict, repr=False)
     tried: tuple[Trial, ...] = ()
     kept: Kept | None = None
@@ -284,8 +284,8 @@ class Infeasibility:
     """Why no start of the class asked for exists, and how short the start time may be."""
 
     problem: Problem
-    shortest_start_time: float  # the shortest one found; inf if none was
     sentence: str
+    shortest_start_time: float = math.inf  # the shortest one found; inf if none was
     at_least: float = 0.0  # no start is shorter, s
     shortest: TorqueProfile | None = None  # the torque of the shortest start found
 
@@ -302,12 +302,12 @@ class Infeasibility:
         }
 
 
-class InfeasibleError(RuntimeError):
+class InfeasibleError(SimulationError):
     """No torque profile meets the bounds.
 
     Parameters
     ----------
-    verdict : Verdict
+    verdict : Infeasibility
         What was asked for, and what start time would do.
 
     Examples
@@ -325,13 +325,13 @@ class InfeasibleError(RuntimeError):
         super().__init__(verdict.sentence)
 
 
-class OptimumError(RuntimeError):
+class OptimumError(SimulationError):
     """A method's answer does not stand: the exact plant or the lower bound contradicts it.
 
     Examples
     --------
-    >>> from softstart import OptimumError
-    >>> issubclass(OptimumError, RuntimeError)
+    >>> from softstart import OptimumError, SimulationError
+    >>> issubclass(OptimumError, SimulationError)
     True
     """
 

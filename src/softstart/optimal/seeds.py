@@ -28,15 +28,14 @@ def pulse_coast_hold(search: Descent, player: DemandSimulator) -> TorqueProfile 
     whether it is in time, its exact start says.
     """
     try:
-        starts = PulseCoastHoldStarts.of_drive(player.machine.two_masses, search.high)
+        starts = PulseCoastHoldStarts(player.machine.two_masses, search.high)
     except InputError:
         return None
 
     def demand(P: float) -> TorqueProfile:
         course = starts.course(P)
-        held = (P * (starts.J1 + starts.J2) - starts.Mc * starts.J1) / starts.J2
         edges, levels = [0.0], []
-        for until, level in ((course.t1, search.high), (course.t_peak, 0.0), (search.until, held)):
+        for until, level in ((course.t1, search.high), (course.t_peak, 0.0), (search.until, starts.held(P))):
             if edges[-1] < until < math.inf:
                 edges.append(until)
                 levels.append(min(max(level, search.low), search.high))

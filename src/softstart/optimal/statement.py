@@ -59,15 +59,6 @@ NEAR = {"ipopt.mu_strategy": "adaptive", "ipopt.bound_push": 1e-4, "ipopt.bound_
 SX = Any  # casadi has no types: a matrix of expressions, a column for each instant
 
 
-class Slot(NamedTuple):
-    """What a variable stands for: "state" (component), "demand", "duration" or "peak"; where in a phase."""
-
-    kind: str
-    phase: int
-    share: float
-    component: int = 0
-
-
 class PhaseTable(NamedTuple):
     """A phase in numbers: its duration, s; states at shares of it; demands, N m, at edges of elements."""
 
@@ -80,11 +71,11 @@ class PhaseTable(NamedTuple):
 
 @dataclass(frozen=True)
 class CollocationSolution:
-    """The demand found, the figure that is minimised as the collocation has it, t_f in s, and the rest."""
+    """A start as the collocation has it."""
 
-    profile: TorqueProfile
-    value: float
-    end_time: float
+    profile: TorqueProfile  # the demand to one elastic period after t_f
+    value: float  # the figure that is minimised
+    end_time: float  # t_f, s
     peak: float  # the largest |T|, N m
     phases: list[PhaseTable]
 
@@ -93,42 +84,24 @@ class CollocationSolution:
 class CasadiProblem:
     """The problem as one nonlinear program of CasADi, f least over x with lbx <= x <= ubx, lbg <= g <= ubg.
 
-    `nlp` has the symbols x (n,), p (none), f and g (m,) for `casadi.nlpsol`; `x0` is the first guess. Torques
-    are in units of the base torque, speeds of the target speed, durations of their first guess, twists of
-    the base torque over the stiffness in contact and of gap/2 in the gap: x and g are of the order of 1.
-    Ordered along the start: peak P, then for each phase its duration, and for each element its demand and
-    its states at five Radau points. dg/dx is banded with elements, but for the full column of P and those of
-    the durations; the Hessian alike. `slots[i]` says what x[i] stands for.
+    `nlp` has the symbols x (n,), f and g (m,) for `casadi.nlpsol`; the solver is called with `arguments`: the
+    first guess x0 and the bounds. Torques are in units of the base torque, speeds of the target speed,
+    durations of their first guess, twists of the base torque over the stiffness in contact and of gap/2 in
+    the gap: x and g are of the order of 1. Ordered along the start: peak P, then for each phase its duration,
+    its demands at the edges of its elements, and its states at five Radau points of each element. dg/dx is
+    banded with elements, but for the full column of P and those of the durations; the Hessian alike.
     """
 
-    problem: Problem
     nlp: dict[str, Any]
-    x0: Vector
-    p: Vector
-    lbx: Vector
-    ubx: Vector
-    lbg: Vector
-    ubg: Vector
-    slots: tuple[Slot, ...]
+    arguments: dict[str, Vector]
     reading: Callable[[Vector], CollocationSolution]
 
-    def _of(self, x: Any) -> CollocationSolution:
-        values = np.array(x, dtype=float).ravel()
-        if values.shape != self.x0.shape:
-            raise InputError(f"x: {values.size} numbers; give the {self.x0.size} of nlpsol's out['x'].")
+    def solution(self, x: Any) -> CollocationSolution:
+        """What a solution x (n,) of `nlpsol` says, by its own collocation; a simulation of it is exact."""
+        values, size = np.array(x, dtype=float).ravel(), self.arguments["x0"].size
+        if values.size != size:
+            raise InputError(f"x: {values.size} numbers; give the {size} of nlpsol's out['x'].")
         return self.reading(values)
-
-    def profile(self, x: Any) -> TorqueProfile:
-        """The torque demand of a solution x (n,), N m over s, to one elastic period after t_f."""
-        return self._of(x).profile
-
-    def k_dyn(self, x: Any) -> float:
-        """K_dyn of a solution x (n,) by its own collocation; a simulation of the profile is exact."""
-        return self._of(x).peak / self.problem.base_torque
-
-    def end_time(self, x: Any) -> float:
-        """The start time t_f of a solution x (n,), s."""
-        return self._of(x).end_time
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,27 +210,25 @@ class _Machine:
 class _Program:
     """Variables and conditions, as the phases are written down; demands and P in base torques."""
 
-    def __init__(self, problem: Problem, phases: list[ContactPhase], period: float) -> None:
-        self.problem, self.machine, self.phases = problem, _Machine(problem), phases
-        self.base, self.target, self.period = problem.base_torque, problem.target, period
+    def __init__(self, problem: Problem, run: Run) -> None:
+        self.problem, self.machine, self.run = problem, _Machine(problem), run
+        self.phases, self.period = phases_of(problem, run), run.elastic_period
+        self.base, self.target = problem.base_torque, problem.target
         self.low, self.high = problem.lowest_torque / self.base, problem.highest_torque / self.base
         self.continuous = math.isfinite(self.machine.rate) or problem.smoothness > 0.0
         points = ca.collocation_points(DEGREE, "radau")
         self.points = np.array(points)
         self.derivative, _, self.weights = (np.array(one) for one in ca.collocation_coeff(points))
-        wrong = self.machine.not_covered | {
-            f"{len(phases)} phases of contact: at most 120": len(phases) > 120
-        }
+        count = len(self.phases)
+        wrong = self.machine.not_covered | {f"{count} phases of contact: at most 120": count > 120}
         if any(wrong.values()):
             raise InputError([f"{text} in the collocation." for text, is_so in wrong.items() if is_so])
 
-    def variable(self, kind: str, phase: int, shares: Vector, guess: Any, low: float, high: float) -> SX:
-        """A column of variables, as many at each share of a phase as the guess has."""
+    def variable(self, name: str, guess: Any, low: float, high: float) -> SX:
+        """A column of as many variables as the guess has."""
         guesses = np.ravel(guess).tolist()
-        each = range(len(guesses) // len(shares))
-        self.x.append(ca.SX.sym(kind, len(guesses)))
+        self.x.append(ca.SX.sym(name, len(guesses)))
         self.limits += [(min(max(one, low), high), low, high) for one in guesses]
-        self.slots += [Slot(kind, phase, share, i) for share in shares.tolist() for i in each]
         return self.x[-1]
 
     def between(self, low: float, value: SX, high: float) -> None:
@@ -267,11 +238,11 @@ class _Program:
 
     def write(self, mesh: list[Vector], guesses: list[PhaseTable], peak: float) -> CasadiProblem:
         """The program on a mesh, the edges of the elements of each phase as shares of it; P in N m."""
-        self.x, self.limits, self.slots = list[SX](), list[tuple[float, float, float]](), list[Slot]()
+        self.x, self.limits = list[SX](), list[tuple[float, float, float]]()
         self.g, self.bounds = list[SX](), list[tuple[float, float]]()
         self.read = list[SX]()  # durations, demands and states of each phase
         most = math.inf if self.problem.k_dyn is None else self.problem.k_dyn
-        self.peak = self.variable("peak", 0, np.zeros(1), peak / self.base, 0.0, most)
+        self.peak = self.variable("peak", peak / self.base, 0.0, most)
         self.elapsed, self.heat, self.rough, self.steps = (ca.SX(0.0) for _ in range(4))
         self.state, self.demand = ca.SX(self.machine.first), ca.SX(self.machine.first_torque) / self.base
         for number, (edges, guess) in enumerate(zip(mesh, guesses, strict=True)):
@@ -293,15 +264,15 @@ class _Program:
         waits = phase.braked and not self.continuous and not machine.lag and math.isinf(machine.release_at)
         shortest = 0.0 if waits else 0.1  # of the duration in the run
         share = guess.length / phase.length
-        length = self.variable("duration", number, np.zeros(1), share, shortest, 8.0) * phase.length
+        length = self.variable("duration", share, shortest, 8.0) * phase.length
         kept = int(self.continuous)  # where it may not jump, the demand goes on
         demands = np.interp(edges, guess.edges, guess.demands)[kept:] / self.base
-        u = self.variable("demand", number, edges[kept:], demands, self.low, self.high)
+        u = self.variable("demand", demands, self.low, self.high)
         u = ca.vertcat(self.demand, u).T if kept else u.T
         zero, size = self.scales(phase)
         shares = self.shares(edges)
         states = np.transpose([np.interp(shares, guess.shares, column) for column in guess.states.T])
-        scaled = self.variable("state", number, shares, (states - zero) / size, -math.inf, math.inf)
+        scaled = self.variable("state", (states - zero) / size, -math.inf, math.inf)
         x = zero + size * ca.reshape(scaled, size.size, -1)
         rise = u[1:] - u[:-1]
         demand = self.base * ca.vertcat(*(u[:-1] + p * rise for p in self.points))
@@ -431,13 +402,13 @@ class _Program:
             profile = TorqueProfile(np.concatenate(times), np.concatenate([one.demands for one in phases]))
             return CollocationSolution(profile, float(figure), float(end), float(peak), phases)
 
-        nlp = {"x": x, "p": ca.SX.sym("p", 0), "f": f, "g": ca.vertcat(*self.g)}
+        nlp = {"x": x, "f": f, "g": ca.vertcat(*self.g)}
         (x0, lbx, ubx), (lbg, ubg) = np.array(self.limits).T, np.array(self.bounds).T
-        return CasadiProblem(problem, nlp, x0, np.zeros(0), lbx, ubx, lbg, ubg, tuple(self.slots), reading)
+        return CasadiProblem(nlp, {"x0": x0, "lbx": lbx, "ubx": ubx, "lbg": lbg, "ubg": ubg}, reading)
 
-    def from_run(self, run: Run, straight: bool) -> CasadiProblem:
-        """The program on elements of equal length in each phase, from the states and demands of a run."""
-        machine, spans, mesh, guesses = self.machine, run.trajectory.spans, [], []
+    def from_run(self, straight: bool) -> CasadiProblem:
+        """The program on elements of equal length in each phase, from the states and demands of the run."""
+        machine, run, mesh, guesses = self.machine, self.run, [], []
         stiffness = machine.c * (1.0 / machine.J[:-1] + 1.0 / machine.J[1:])
         for phase in self.phases:
             fastest = math.sqrt(stiffness[np.array(phase.pressing) != 0].max(initial=0.0))
@@ -445,7 +416,7 @@ class _Program:
             count = math.ceil(phase.length * max(fastest / 3.0, 16.0 / self.period))
             edges = np.linspace(0.0, 1.0, 1 + max(2, count))
             inside = phase.begin + phase.length * edges.clip(LEAST, 1.0 - LEAST)
-            span = spans[run.trajectory.index(inside)]
+            span = run.trajectory.spans[run.trajectory.index(inside)]
             demands = span[:, rec.S_REF] + span[:, rec.S_SLOPE] * (inside - span[:, rec.S_START])
             shares = np.array([0.0, 1.0]) if straight else self.shares(edges)
             values = run.trajectory.at(phase.begin + phase.length * shares)
@@ -478,10 +449,10 @@ def as_casadi(problem: Problem, run: Run, straight: bool = False) -> CasadiProbl
     >>> pulse = TorqueProfile([0.0, 0.0076, 0.0076, 0.0217, 0.0217], [62.0, 62.0, 0.0, 0.0, 56.2])
     >>> run = simulate(drive, "profile", 0.4, parameters={"profile": pulse})
     >>> nlp = as_casadi(Problem(drive, 0.2883042), run)
-    >>> nlp.nlp["x"].shape == (nlp.x0.size, 1), nlp.slots[0].kind
-    (True, 'peak')
+    >>> nlp.nlp["x"].shape == (nlp.arguments["x0"].size, 1)
+    True
     """
-    return _Program(problem, phases_of(problem, run), run.elastic_period).from_run(run, straight)
+    return _Program(problem, run).from_run(straight)
 
 
 def solve_collocation(problem: Problem, run: Run, straight: bool = False) -> CollocationSolution:
@@ -489,8 +460,8 @@ def solve_collocation(problem: Problem, run: Run, straight: bool = False) -> Col
 
     Raises InputError as `as_casadi`, and NotConverged where IPOPT finds no solution on the first mesh.
     """
-    program = _Program(problem, phases_of(problem, run), run.elastic_period)
-    nlp = program.from_run(run, straight)
+    program = _Program(problem, run)
+    nlp = program.from_run(straight)
     best = nlp.reading(_minimised(nlp, {} if straight else NEAR))
     span = problem.highest_torque - problem.lowest_torque
     for _ in range(3):
@@ -509,13 +480,14 @@ def _minimised(nlp: CasadiProblem, options: dict[str, Any]) -> Vector:
     """The solution of IPOPT from the first guess; NotConverged if there is none."""
     solver = ca.nlpsol("start", "ipopt", nlp.nlp, OPTIONS | options)
     try:
-        out = solver(x0=nlp.x0, p=nlp.p, lbx=nlp.lbx, ubx=nlp.ubx, lbg=nlp.lbg, ubg=nlp.ubg)
+        out = solver(**nlp.arguments)
     except RuntimeError as error:
         if "KeyboardInterrupt" in str(error):
             raise KeyboardInterrupt from error
         raise
     stats, g = solver.stats(), np.array(out["g"]).ravel()
     if not stats["success"]:
-        violation = float(np.maximum(nlp.lbg - g, g - nlp.ubg).max(initial=0.0))
+        low, high = nlp.arguments["lbg"], nlp.arguments["ubg"]
+        violation = float(np.maximum(low - g, g - high).max(initial=0.0))
         raise NotConverged(str(stats["return_status"]), violation)
     return np.array(out["x"]).ravel()

@@ -110,7 +110,7 @@ def refuse_weak_curve(problem: Problem) -> None:
         if motor <= load:
             raise InfeasibleError(
                 Infeasibility(
-                    problem, math.inf,
+                    problem,
                     f"torque_speed: at {w[0]:.4g} rad/s the motor has {motor:.4g} N m and the load takes "
                     f"{load:.4g} N m, so {machine.name} does not come to {start.end:.4g} rad/s; give a curve "
                     "that lies above the load up to this speed.",

@@ -12,8 +12,8 @@ import os
 import re
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -74,8 +74,7 @@ def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progres
     from softstart.views.optima import optimum_sheet
 
     progress(None, "minimising K_dyn")
-    with no_solution_as_sentence():
-        best = optimize(drive, start_time, terminal=terminal)
+    best = optimize(drive, start_time, terminal=terminal)
     others = []
     for name in ready_controller_names():
         with suppress(InputError, SimulationError):
@@ -88,7 +87,7 @@ def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progres
 
 def optimum_label(best: Optimum) -> str:
     """What the optimum is called among the strategies."""
-    from softstart.optimal.problem import best_start
+    from softstart.views.optima import best_start
 
     ending = "" if best.problem.terminal == "reached" else f", {best.problem.terminal}"
     return f"{best_start(best.problem.drive)} {best.end_time:.4g} s{ending}"
@@ -120,30 +119,18 @@ def curve(
     from softstart.optimal import front
 
     progress(None, "the shortest start time")
-    with no_solution_as_sentence():
-        times = front.default_start_times(drive, terminal)
-        total, done = len(times) + len(controllers), 0
+    total, done = front.COUNT + len(controllers), 0
 
-        def doing(what: str) -> None:
-            nonlocal done
-            within = what.rpartition(": ")[2].removesuffix(f", {terminal}")
-            progress(min(done / total, 1.0), f"start in {within}")
+    def doing(what: str) -> None:
+        nonlocal done
+        _, point, within = what.rpartition(": ")
+        if point:
+            progress(min(done / total, 1.0), f"start in {within.removesuffix(f', {terminal}')}")
             done += 1
 
-        limit = front.pareto(drive, times, terminal=terminal, controllers=controllers, progress=doing)
+    limit = front.pareto(drive, terminal=terminal, controllers=controllers, progress=doing)
     name = file_name(drive.name, "limit", suffix=".csv")
     return TaskResult(shown(limit.sheet, first=True), {name: written_text(limit.to_csv, ".csv")})
-
-
-@contextmanager
-def no_solution_as_sentence() -> Iterator[None]:
-    """Turns "there is no solution" and "none was found" into a SimulationError with that sentence."""
-    from softstart.optimal.result import InfeasibleError, OptimumError
-
-    try:
-        yield
-    except (InfeasibleError, OptimumError) as error:
-        raise SimulationError(str(error)) from error
 
 
 def tuning(
@@ -276,8 +263,7 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
         return TaskResult(shown(*sheets))
     progress(0.8, "the quickest start that keeps the limits")
     try:
-        with no_solution_as_sentence():
-            best = optimize(machine, limits=True)
+        best = optimize(machine, limits=True)
     except (InputError, SimulationError) as error:
         notes = error.sentences if isinstance(error, InputError) else [str(error)]
         return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=notes)))

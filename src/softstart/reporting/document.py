@@ -18,7 +18,6 @@ from matplotlib.patches import Rectangle
 from softstart.drive import Drive, Machine, plausibility
 from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
-from softstart.optimal.problem import REACTS, best_start
 from softstart.reporting import choice, limit
 from softstart.reporting.inverters import at_inverters, inverters, speed_values
 from softstart.start import fatigue
@@ -45,6 +44,7 @@ from softstart.views.numbers import (
     unit,
     units_of,
 )
+from softstart.views.optima import REACTS, best_start
 from softstart.views.sheet import html_table
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from softstart.drive import Machine
 from softstart.errors import InputError
 from softstart.optimal.bounds import momentum_bound, momentum_shortest_time
-from softstart.optimal.front import FrontPoint, TimeRange
+from softstart.optimal.front import FrontPoint, front_point
 from softstart.optimal.optimize import optimize
 from softstart.optimal.path import Path as StartPath
 from softstart.optimal.problem import Problem, Terminal
@@ -204,7 +204,6 @@ def _in_own_process(
 
 def stream_optima(drive: Machine, start_times: Sequence[float], *, progress: WorkerProgress) -> None:
     """Look for the optima of start times and send each at once: the first one, then by distance to it."""
-    question = TimeRange(drive, {}, TERMINAL)
-    path = StartPath(question.problem(1.0))
+    path = StartPath(Problem(drive, 1.0, TERMINAL))
     for start_time in sorted(start_times, key=lambda one: abs(one - start_times[0])):
-        progress.part(question.point(start_time, path))
+        progress.part(front_point(replace(path.problem, start_time=start_time), path))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from softstart.optimal.front import Front
-from softstart.optimal.problem import REACTS, best_k_dyn, best_start
 from softstart.optimal.result import Optimum
 from softstart.start.metrics import REFERENCE
 from softstart.start.recommendation import margins_of
@@ -25,11 +24,32 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from softstart.drive import Machine
+
+REACTS = (  # what is to be said beside a best fixed profile
+    "It is one torque over time for every start position: feedback reacts to the contact, and its K_dyn can "
+    "be lower."
+)
 OBJECTIVES = {"heat": "minimum heat", "start_time": "minimum start time"}
 REPLAY = "softstart simulate {what}.toml --controller profile --param file=profile.csv"
 UNRECORDED = (
     "profile", "seconds", "tried", "k_dyn_if_position_known", "k_dyn_each", "start_times", "scenarios",
 )  # fmt: skip
+
+
+def best_start(machine: Machine) -> str:
+    """What the best torque over time is called: no optimum where the position is unknown, as feedback reacts.
+
+    >>> from softstart import Drive
+    >>> best_start(Drive.load("crane-4amtkf")), best_start(Drive.load("long-travel-3kw"))
+    ('optimum', 'best fixed profile')
+    """
+    return "best fixed profile" if len(machine.positions) > 1 else "optimum"
+
+
+def best_k_dyn(machine: Machine) -> str:
+    """What its K_dyn is called."""
+    return "K_dyn of the best fixed profile" if len(machine.positions) > 1 else "minimum K_dyn"
 
 
 # one optimal start ------------------------------------------------------------------------------------------

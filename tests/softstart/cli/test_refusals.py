@@ -49,7 +49,7 @@ REFUSED = [
     ("pareto --start-times 0.3:0.4", "from:to:count"),
     ("pareto --start-times 0.3:1.2x:5", "both ends"),
     ("pareto --controllers profile", "profile"),
-    ("pareto --start-times 0.3,0.4 --workers none", '--workers = "none": give a whole number of 1 or more.'),
+    ("sweep --controller ramp --axis gap=0.5,1 --workers none", "--workers", "a whole number of 1 or more"),
     # tune
     (RAMP + "--inertias 2J1:0.2:4", "--inertias", "both"),
     (RAMP + "--free time=3", "name=low:high"),

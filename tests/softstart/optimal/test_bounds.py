@@ -149,7 +149,7 @@ def test_several_machines_have_the_largest_bound() -> None:
     wide = CRANE.replace(gap=0.8)
     problem = Problem(CRANE, LONG, "reached", scenarios=(wide,))
     each = [momentum_bound(Problem(one, LONG, "reached", base=CRANE)).k_dyn for one in (CRANE, wide)]
-    assert momentum_bound(problem).k_dyn == max(each) == problem.lower_bound().k_dyn
+    assert momentum_bound(problem).k_dyn == max(each)
     times = [momentum_shortest_time(Problem(one, LONG, "reached")) for one in (CRANE, wide)]
     assert momentum_shortest_time(problem) == max(times)
     unknown = CRANE.replace(start_position="unknown")

@@ -17,7 +17,6 @@ from softstart.optimal.front import (
     Front,
     FrontPoint,
     _monotone,
-    default_start_times,
     pareto,
 )
 
@@ -68,8 +67,7 @@ def test_a_start_that_arrives_early_counts_for_every_longer_time() -> None:
         point(0.5, 2.8, 2.4),
         point(0.6, 2.9, 2.0),
     ]
-    made = dict(_monotone(found))
-    points = [made[t] for t in sorted(made)]
+    points = list(_monotone(found))
     assert [p.k_dyn for p in points] == [None, 3.0, 3.0, 3.0, 2.8, 2.8]
     assert [p.k_dyn_lower_bound for p in points[1:]] == [2.5, 2.6, None, 2.4, 2.0]
     assert [p.start_time for p in points[1:]] == [0.2, 0.2, 0.2, 0.5, 0.5]
@@ -150,28 +148,10 @@ def test_a_sweep_that_was_stopped_goes_on_where_it_was(tmp_path: Path, front: Fr
     for record in before:
         assert by_time[record["start_time_bound"]] == FrontPoint.of_record(record)  # its computing time too
 
-    each: list[FrontPoint] = []
-    pareto(CRANE, TIMES, **options, progress=again.append, each=each.append)
-    assert len(again) == 1
-    assert [one.start_time_bound for one in each] == sorted(TIMES, reverse=True)
     pareto(CRANE, [0.33, 0.3], **options, progress=again.append)  # further start times join the file
     assert len(again) == 2
     for kept_point, fresh in zip(second.points, front.points, strict=True):
         assert kept_point.k_dyn == pytest.approx(fresh.k_dyn, rel=1e-6)
-
-
-@pytest.mark.slow
-def test_workers_find_the_same(tmp_path: Path, front: Front) -> None:
-    """Each has a stretch of start times; what they find is kept, and goes on alone."""
-    kept = tmp_path / "front.sqlite"
-    shared = pareto(CRANE, [*TIMES, 0.1], controllers=[], workers=2, save_to=kept)
-    assert [point.status for point in shared.points] == ["INFEASIBLE", *["OPTIMAL"] * 3]
-    for one, other in zip(shared.points[1:], front.points, strict=True):
-        assert one.k_dyn == pytest.approx(other.k_dyn, rel=1e-6)
-    asked: list[str] = []
-    again = pareto(CRANE, [*TIMES, 0.1], controllers=[], save_to=kept, progress=asked.append)
-    assert asked == []
-    assert again.points == shared.points
 
 
 @pytest.fixture(scope="module")
@@ -216,9 +196,10 @@ def test_bad_input(options: dict[str, Any], says: str) -> None:
         pareto(**{"drive": CRANE, "start_times": [0.3], "controllers": []} | options)
 
 
-def test_default_start_times() -> None:
+def test_start_times_if_none_are_given() -> None:
     """From hardly more than the shortest start, which is under constant torque where there is no gap."""
-    times, direct = default_start_times(QUICK), simulate(QUICK, "direct").start_time
+    direct = simulate(QUICK, "direct").start_time
+    times = [point.start_time_bound for point in pareto(QUICK, controllers=[]).points]
     assert times[0] == pytest.approx(1.02 * direct, rel=1e-3)
     assert times[-1] == pytest.approx(1.6 * direct)
     shares = [(time - times[0]) / (times[-1] - times[0]) for time in times]

@@ -180,15 +180,14 @@ def test_the_phases_are_those_of_the_record():
 def test_the_program_is_one_for_any_solver():
     problem = Problem(CRANE, 0.3, "reached")
     one = as_casadi(problem, guess(56.0, 0.3), straight=True)
-    x = ca.nlpsol("s", "ipopt", one.nlp, {"ipopt.print_level": 0, "print_time": False})(
-        x0=one.x0, p=one.p, lbx=one.lbx, ubx=one.ubx, lbg=one.lbg, ubg=one.ubg
-    )["x"]
-    assert len(one.slots) == x.shape[0] == one.lbx.size
-    assert one.end_time(x) == pytest.approx(0.3, rel=1e-6)
-    exact = played(CRANE, one.profile(x), 0.3 + CRANE.elastic_period)
-    assert exact.k_dyn == pytest.approx(one.k_dyn(x), rel=WITHIN)
+    solver = ca.nlpsol("s", "ipopt", one.nlp, {"ipopt.print_level": 0, "print_time": False})
+    found = one.solution(solver(**one.arguments)["x"])
+    assert found.end_time == pytest.approx(0.3, rel=1e-6)
+    exact = played(CRANE, found.profile, 0.3 + CRANE.elastic_period)
+    assert exact.k_dyn == pytest.approx(found.value, rel=WITHIN)
+    assert found.value == found.peak / problem.base_torque
     with pytest.raises(InputError, match="x: 3 numbers"):
-        one.k_dyn([0.0, 1.0, 2.0])
+        one.solution([0.0, 1.0, 2.0])
 
 
 def test_a_start_time_that_is_too_short_is_no_result():

@@ -31,7 +31,6 @@ from softstart import (
 )  # fmt: skip
 from softstart.controller import make_controller
 from softstart.identification.planning import simulated_log
-from softstart.optimal.result import OptimumError
 from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
 from softstart.page.panels import grid_of, tunable_controllers
@@ -141,15 +140,15 @@ def test_the_gentlest_start_and_its_files(tmp_path: Path) -> None:
     for suffix in (".csv", ".toml"):
         assert simulate(CRANE, profile_of_file(found, suffix, tmp_path)).k_dyn == best.k_dyn
     assert any("double torque_profile(double time)" in one for one in found.files.values())
-    with pytest.raises(SimulationError, match="no way"), tasks.no_solution_as_sentence():
-        raise OptimumError("no way")
+    with pytest.raises(SimulationError, match="No torque brings"):
+        done(tasks.optimum_task, CRANE, "0.1", "reached")
     with pytest.raises(InputError, match="start_time"):
         done(tasks.optimum_task, CRANE, "-1", "reached")
 
 
 def test_the_limit_holds_the_strategies(monkeypatch: pytest.MonkeyPatch) -> None:
     usual = [0.36, 0.4, 0.5]
-    monkeypatch.setattr("softstart.optimal.front.default_start_times", lambda drive, terminal: usual)
+    monkeypatch.setattr("softstart.optimal.front._usual_times", lambda path, drive: usual)
     runs = {name: simulate(CRANE, name) for name in ("current-limit-feedback", "ramp")}
     found, text, shares = done(tasks.curve, CRANE, [make_controller(name) for name in runs], "reached")
     (table,) = found.files.values()
