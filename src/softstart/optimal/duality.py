@@ -29,18 +29,14 @@ from softstart.arrays import Indices, Vector
 from softstart.drive import Drive
 from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.duality_program import (
-    DEMAND,
     MEAN,
     RAMPED,
-    RUB,
     W1,
     W2,
     Layout,
     Model,
     Phase,
-    R,
     Row,
-    U,
     Y,
     Z,
     good_multipliers,
@@ -54,7 +50,7 @@ from softstart.optimal.starts import parts
 Span = tuple[float, float]
 
 WITHIN = 5e-4  # the work ends once the bound is within this share of what is judged
-CELLS = 24_000  # in linear programs, a half of them for starts that close once: some 0.4 ms each
+CELLS = 20_000  # in linear programs, a half of them for starts that close once: some 0.45 ms each
 PARTS = 400  # of the ends of a box, of each of which is known what is proved
 PROGRAMS = 12  # for one box at most
 PER_PERIOD, LONG, EDGE = 18, 3.0, 4.0  # cells of a period; longer ones where T is held, so far from events
@@ -101,40 +97,30 @@ def _not_covered(problem: Problem, machine: Any) -> str:
     })  # fmt: skip
 
 
-def dual_bounds(
-    problem: Problem, k_dyn: float, end: float | None = None, *, cells: int = CELLS
-) -> tuple[LowerBound, LowerBound]:
+def dual_bounds(problem: Problem, k_dyn: float, *, cells: int = CELLS) -> tuple[LowerBound, LowerBound]:
     """Lower bounds on K_dyn for any number of contacts, and for starts whose gap closes once.
 
-    Both hold for every start that ends at the start time, or `end` in s, or before. `k_dyn` is what is to be
-    judged: the work ends once a bound is within 5e-4 of it, or after linear programs with so many cells in
-    all: a count, so that equal requests have equal bounds. Where nothing is better the momentum bound.
+    Both hold for every start that ends at the start time or before. `k_dyn` is what is to be judged: the work
+    ends once a bound is within 5e-4 of it, or after linear programs with so many cells in all, a count, so
+    that equal requests have equal bounds. Where nothing is better the momentum bound.
 
     >>> drive = Drive.load("crane-4amtkf").replace(target_speed=60.0)
-    >>> for bound in dual_bounds(Problem(drive.replace(torque_lag=0.002), 0.2883042), 0.9237):
-    ...     print(round(bound.k_dyn, 2), bound.kind)
-    0.92 duality
-    0.92 duality
+    >>> _, once = dual_bounds(Problem(drive.replace(torque_lag=0.002), 0.2883042), 0.9237, cells=4000)
+    >>> once.kind, 0.91 < once.k_dyn < 0.9237
+    ('duality', True)
     """
-    if end is not None:
-        limit = None if problem.minimise == "k_dyn" else problem.k_dyn
-        problem = replace(problem, start_time=end, minimise="k_dyn" if limit is None else "heat", k_dyn=limit)
     whole = momentum_bound(problem)
-    if not_covered(problem):
+    if not_covered(problem) or whole.kind == "none":
         return whole, whole
     best = [whole, whole]
     for machine in problem.machines:
-        left = [i for i in (0, 1) if best[i].k_dyn < k_dyn * (1.0 - WITHIN)]
-        if not left or whole.kind == "none":
+        if best[0].k_dyn >= k_dyn * (1.0 - WITHIN):
             break
         found = _Search(problem, machine, k_dyn).both(cells // len(problem.machines))
         for i, peak in enumerate(found):
-            if peak * float(machine.Ms) / problem.base_torque > best[i].k_dyn:
-                best[i] = LowerBound(
-                    peak * float(machine.Ms) / problem.base_torque,
-                    "duality",
-                    _covers(problem, machine, i == 1),
-                )
+            least = peak * float(machine.Ms) / problem.base_torque
+            if least > best[i].k_dyn:
+                best[i] = LowerBound(least, "duality", _covers(problem, machine, i == 1))
     return best[0], best[1]
 
 
@@ -166,11 +152,6 @@ class Box:
     finer: int = 1
     known: Vector | None = None  # what is proved so far of equal parts of `start`
 
-    @property
-    def longest(self) -> float:
-        """Of the first contact, to the end."""
-        return self.close[1] if self.close else self.start[1]
-
 
 class _Search:
     """The boxes of a machine, the least bound first; everything without dimensions."""
@@ -183,10 +164,7 @@ class _Search:
         # what the load loses until the closing, as torque
         self.fallen = 0.0 if m.sticks or m.b2 else m.mc
         self.held = self.goal <= m.mu1 * (m.hi - m.F) + m.mu2 * m.mc  # some u holds so large a T
-        self.tail = self.kernel() * (not (m.pulls and m.sticks))
-        if m.sticks:  # the load moves on until then
-            self.tail = min(self.tail, 0.99 * m.W / (m.mu2 * m.mc))
-        self.after, self.left = self.coasting(), 0
+        self.left = 0  # cells of linear programs
 
     def both(self, cells: int) -> tuple[float, float]:
         """(any number of contacts, those that close once): the least P, in Ms."""
@@ -215,39 +193,10 @@ class _Search:
         first = 0.0 if m.z0 >= 0.0 else float(times[closed[0] - 1]) if closed.size else self.end
         return times, every[:, W1] - every[:, W2], first
 
-    def kernel(self, n: int = 400) -> float:
-        """No torque after the end lowers T sooner than after so long."""
-        m, h = self.model, self.model.half / 400
-        E, x = m.step(Phase("contact", "moves", h)).E, np.eye(8)[W1]
-        for k in range(n):
-            x = E @ x
-            if m.T @ x <= 0.0:
-                return k * h
-        return m.half * (1.0 - 1e-9)
-
-    def coasting(self, n: int = 200) -> Vector:
-        """Most T, less the least P, that the least torque after the end can bring once the gap has opened."""
-        m, h = self.model, self.tail / 200
-        if h <= 0.0:
-            return np.zeros(1)
-        step = m.step(Phase("contact", "moves", h))
-        x, most, found = np.zeros(8), 0.0, [0.0]
-        x[[W1, W2]], x[[U, R]], p = m.W, m.hi * m.slow, np.zeros(6)
-        for _ in range(n):
-            p[[DEMAND, RUB]] = -min(1.0, float(x[m.demand]) / (h * m.rate)) if m.ramped else 0.0, -m.F
-            x = step.E @ x + step.fixed + step.G @ p
-            most = max(most, float(m.T @ x))
-            found.append(most)
-        return np.maximum(np.array(found) - m.least, 0.0)
-
-    def speed(self, t: float) -> float:
-        """Largest z' in the open gap until t."""
-        return float(self.speeds[min(int(np.searchsorted(self.times, t)), self.speeds.size - 1)])
-
     def plain(self, box: Box) -> float:
         """What momentum says of a box."""
         m = self.model
-        left = box.move[1] if box.move else box.longest
+        left = (box.move or box.close or box.start)[1]
         lost = self.fallen * max(self.first, box.start[0] - left)
         return m.mc + (m.W / m.mu2 + lost) / left if left > 0.0 else math.inf
 
@@ -272,23 +221,19 @@ class _Search:
 
     def least(self, boxes: list[Box], goal: float) -> float:
         """The least bound over all boxes; what is known of it above the goal or when the work is done."""
-        tie = itertools.count()
-        heap = [(self.plain(box), next(tie), box, False) for box in boxes]
+        tie, narrow = itertools.count(), math.inf
+        heap = [(self.plain(box), next(tie), box) for box in boxes]
         heapq.heapify(heap)
-        while heap:
-            value, _, box, done = heapq.heappop(heap)
-            if value >= goal or self.left <= 0:
-                return value
-            if not done:
-                low, box = self.judged(box, goal)
-                heapq.heappush(heap, (max(value, low), next(tie), box, True))
-                continue
-            halves = self.split(box)
+        while heap and heap[0][0] < min(goal, narrow) and self.left > 0:
+            value, _, box = heapq.heappop(heap)
+            low, box = self.judged(box, goal)
+            value = max(value, low)
+            halves = self.split(box) if value < goal else []
             if not halves:
-                return value
+                narrow = min(narrow, value)
             for half in halves:
-                heapq.heappush(heap, (max(value, self.plain(half)), next(tie), half, False))
-        return math.inf
+                heapq.heappush(heap, (max(value, self.plain(half)), next(tie), half))
+        return min(narrow, heap[0][0] if heap else math.inf)
 
     def judged(self, box: Box, goal: float) -> tuple[float, Box]:
         """What linear programs prove of a box, each for the end of which least is known."""
@@ -356,61 +301,44 @@ def _least_within(edges: Vector, values: Vector, others: Vector) -> Vector:
 # cells and rows of a box ------------------------------------------------------------------------------------
 
 
-class _Instants:
-    """Edges of a box as times from the end on; far ones where there is no such instant."""
-
-    def __init__(self, search: _Search, box: Box) -> None:
-        far, m = -box.start[1], search.model
-        every = box.close, box.move, box.part
-        spans = [(-span[1], -span[0]) if span else None for span in every]
-        (self.c0, self.c1), (self.s0, self.s1) = (one or (far, far) for one in spans[:2])
-        self.o0, self.o1 = spans[2] or (math.inf, math.inf)
-        self.tail = 0.0 if box.part else search.tail
-        self.speed = search.speed(self.c1 + box.start[1]) if box.close else 0.0
-        self.most = self.speed * (self.c1 - self.c0 + m.d)  # T until all have closed
-        # z' is not below 0 so soon after a closing
-        self.rises = self.c1 - self.c0 <= 0.5 * m.half
-        self.begin = self.c0 if box.again else self.s0
-        instants = self.c0, self.c1, self.s0, self.s1, self.o0
-        marks = {t for t in instants if far < t < 0.0}
-        self.marks, self.far = {far, 0.0, self.tail} | marks, far
-
-    def phase(self, t: float, moves: bool) -> Phase:
-        """At t between marks."""
-        shaft: Any = "open" if t < self.c0 else "enter" if t < self.c1 else "contact"
-        load: Any = "moves" if not moves or t > self.s1 else "rests" if t < self.begin else "held"
-        shaft = "free" if t > self.o0 else shaft
-        return Phase(shaft, load, 0.0, self.most * (shaft == "enter"))
-
-
 def layout(search: _Search, box: Box, begin: float) -> Layout:
-    """The cells and rows of a box, with a node at the start of length `begin`."""
-    m, at = search.model, _Instants(search, box)
-    cells, rows, node = list[Phase](), list[Row](), {at.far: 0}
-    joins = m.d > 0.0
-    for a, b in pairwise(sorted(at.marks | {-begin})):
-        phase, t = at.phase(0.5 * (a + b), box.move is not None), a
-        for h in _lengths(phase.shaft, b - a, 2.0 * math.pi / PER_PERIOD / box.finer, search.held):
-            t += h
-            one = phase._replace(length=h)
-            if phase.shaft == "free":
-                # T cannot rise more quickly once all have opened, as z' is limited
-                rise = m.quickest * (t - at.o0 + m.d) if t - h >= at.o1 else 1.0
-                late = -1.0 if at.o0 >= at.c1 else at.most
-                one = one._replace(most=min(1.0, rise), joins=joins, begin=late if joins else -1.0)
-                joins = False
-            cells.append(one)
-            rows += _limits(m, one, len(cells)) if b <= 0.0 else _after(search, h, t, len(cells))
-        node[b] = len(cells)
-    rows += _entering(m, at, cells) + list(_instants(m, at, box, node))
-    unit, terminal = np.eye(8), list[tuple[Vector, float]]()
+    """The cells and rows of a box, with a node where starts of length `begin` do.
+
+    Times run up to 0, the end; instants that there are not are the first.
+    """
+    m, far, unit = search.model, -box.start[1], np.eye(8)
+    (c0, c1), (s0, s1) = ((-span[1], -span[0]) if span else (far, far) for span in (box.close, box.move))
+    o0, o1 = (-box.part[1], -box.part[0]) if box.part else (math.inf, math.inf)
+    rested = c0 if box.again else s0
+    # the largest z' in the open gap
+    speed = float(search.speeds[np.searchsorted(search.times[:-1], c1 - far)])
+    most = speed * (c1 - c0 + m.d)  # T until all have closed
+    joins = follows = m.d > 0.0 and o0 >= c1  # y begins with z
+    cells, rows, before = list[Phase](), list[Row](), 0
+    for a, b in pairwise(sorted({far, 0.0} | {t for t in (c0, c1, s0, s1, o0, -begin) if far < t < 0.0})):
+        t, before = 0.5 * (a + b), len(cells) if a == -begin else before
+        shaft: Any = "free" if t > o0 else "open" if t < c0 else "enter" if t < c1 else "contact"
+        load: Any = "moves" if t > s1 else "rests" if t < rested else "held"
+        for h in _lengths(shaft, b - a, 2.0 * math.pi / PER_PERIOD / box.finer, search.held):
+            cell = Phase(shaft, load, h, most * (shaft == "enter"), joins and shaft == "free")
+            joins = joins and not cell.joins
+            cells.append(cell)
+            rows += _limits(m, cell, len(cells), follows)
+            if shaft == "enter" and c1 - c0 <= 0.5 * m.lasts:  # z' >= 0 then: the chord of max(0, z)
+                rows.append(Row(len(cells), unit[MEAN] / h, 0.5 * speed * (c1 - c0)))
+        if b == c1 < 0.0 and c1 <= o0:
+            rows.append(Row(len(cells), -unit[Z], 0.0))
+        if b == o0 >= c1 and m.lasts > 0.0:  # z' >= -P on the way back to the opening
+            back = o1 - o0 + m.d * (not m.pulls)
+            rows.append(Row(len(cells), unit[Z], 0.0, back))
+            rows.append(Row(len(cells), unit[W1] - unit[W2], 0.0, o1 - o0))
+        if b == s1:  # the last standstill is no earlier than s0, and T no more than P since
+            rows.append(Row(len(cells), unit[W2], -m.mu2 * m.mc * (s1 - s0), m.mu2 * (s1 - s0)))
     if m.terminal == "reached":
-        rows.append(Row(node[0.0], -unit[W2], -m.W))
-    else:
-        terminal = [(unit[W2], m.W), (unit[W1], m.W), (unit[Z], m.mc + m.b2 * m.W)]
-        # so small a load torque at a steady end counts as none, and no torque does not fix z
-        terminal = terminal[: 3 if m.terminal == "steady" and m.mc > 2e-4 else 2]
-    return Layout(cells, rows, terminal, node[0.0], node[-begin])
+        return Layout(cells, [*rows, Row(len(cells), -unit[W2], -m.W)], [], before)
+    terminal = [(unit[W2], m.W), (unit[W1], m.W), (unit[Z], m.mc + m.b2 * m.W)]
+    # so small a load torque at a steady end counts as none, and no torque does not fix z
+    return Layout(cells, rows, terminal[: 3 if m.terminal == "steady" and m.mc > 2e-4 else 2], before)
 
 
 def _lengths(shaft: str, whole: float, fine: float, held: bool) -> list[float]:
@@ -430,18 +358,7 @@ def _lengths(shaft: str, whole: float, fine: float, held: bool) -> list[float]:
     return edge + even(whole - 2.0 * EDGE, LONG * fine, 1) + edge
 
 
-def _after(search: _Search, h: float, t: float, node: int) -> Iterator[Row]:
-    """T after the end, until which t has gone by, under the least torque: the start itself has no less."""
-    m, k = search.model, math.ceil(t / search.tail * (search.after.size - 1))
-    more, unit = float(search.after[min(k, search.after.size - 1)]), np.eye(8)
-    factor = 1.0 + 2.0 * m.mu2**2 * m.b2 * search.tail  # as the load may have become quicker
-    yield Row(node, m.T, more, factor)
-    yield Row(node, unit[MEAN] / h, more, factor)
-    if m.ramped:
-        yield Row(node, -unit[RAMPED] / h, 0.0)
-
-
-def _limits(m: Model, cell: Phase, node: int) -> Iterator[Row]:
+def _limits(m: Model, cell: Phase, node: int, follows: bool) -> Iterator[Row]:
     """What holds at the end of a cell and throughout it."""
     unit, h = np.eye(8), cell.length
     if m.ramped:
@@ -452,7 +369,6 @@ def _limits(m: Model, cell: Phase, node: int) -> Iterator[Row]:
     if cell.shaft == "open":
         yield Row(node, unit[Z], 0.0)
     elif cell.shaft == "contact":
-        yield Row(node, m.T, 0.0, 1.0)
         yield Row(node, unit[MEAN] / h, 0.0, 1.0)
         if cell.load == "rests":
             yield Row(node, m.T, m.mc)
@@ -462,30 +378,7 @@ def _limits(m: Model, cell: Phase, node: int) -> Iterator[Row]:
     elif cell.shaft == "free":
         yield Row(node, unit[Z], 0.0, 1.0)
         yield Row(node, -unit[Z], m.gap, 1.0)
-        yield Row(node, unit[Z] - unit[Y], 0.0) if m.d > 0.0 else Row(node, unit[MEAN] / h, 0.0)
-
-
-def _entering(m: Model, at: _Instants, cells: list[Phase]) -> list[Row]:
-    """T <= (z + width v)/2 + d z' while the closing is within its cell: the chord of max(0, z)."""
-    most, unit = (0.5 * at.speed + m.d * m.drag) * (at.c1 - at.c0), np.eye(8)
-    entering = [k for k, cell in enumerate(cells) if cell.shaft == "enter" and at.rises]
-    return [Row(k + 1, unit[MEAN] / cells[k].length, most) for k in entering]
-
-
-def _instants(m: Model, at: _Instants, box: Box, node: dict[float, int]) -> Iterator[Row]:
-    """What is known at closing, opening and breakaway, less what can change within their cells."""
-    unit, closed = np.eye(8), at.c1 <= at.o0
-    if box.close and closed and at.c1 in node and at.c1 < 0.0:
-        yield Row(node[at.c1], -unit[Z], 0.0)
-    if box.part and closed and at.o0 in node:
-        width = at.o1 - at.o0
-        back = width + m.d * (not m.pulls)
-        yield Row(node[at.o0], unit[Z], m.drag * back, back)
-        yield Row(node[at.o0], unit[W1] - unit[W2], m.drag * width, width)
-    if box.move and at.s1 in node:
-        width = at.s1 - at.s0
-        yield Row(node[at.s1], unit[W2], -m.mu2 * m.mc * width, m.mu2 * width)
-        if at.c1 <= at.s1 <= at.o0 and m.b1 == 0.0:
-            change = width * (width + m.d)
-            least = m.mc - width * m.d * m.mu1 * (m.hi + m.F) - change * m.F * m.mu1
-            yield Row(node[at.s1], -m.T, -least, change)
+        if follows:
+            yield Row(node, unit[Z] - unit[Y], 0.0)
+        elif m.d == 0.0:
+            yield Row(node, unit[MEAN] / h, 0.0)

@@ -6,40 +6,37 @@ Ms Omega/c. The inequality, the phases and their proof: docs/theory/optimum.md, 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-import highspy
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy import sparse
 from scipy.linalg import expm
 
 from softstart.arrays import Indices, Matrix, Vector
 from softstart.drive import Drive
 from softstart.optimal.bounds import half_period
 from softstart.optimal.problem import Problem
+from softstart.optimal.program import LinearProgram
 
 # z beyond the driving flank, speeds, torque u, demand r behind its rate limit, y (never below z); integrals
 # over a cell of what has a limit at every instant there: of T or T+ and z, and of what is ramped
 Z, W1, W2, U, R, Y, MEAN, RAMPED = range(8)
-# demand or its rate, friction of the motor, T on the driving and on the other flank, what holds the load; y
-# at the opening
-DEMAND, RUB, PUSH, PULL, HOLD, BEGIN = range(6)
+# demand or its rate, friction of the motor, T on the driving and on the other flank, what holds the load
+DEMAND, RUB, PUSH, PULL, HOLD = range(5)
+INTEGRALS = np.isin(np.arange(8), [MEAN, RAMPED])
 STEPS, MOST_STEPS = 12, 400  # of a cell: integrals are enclosed in each
 ROUNDING = 1e-10  # of the sum of the absolute terms is taken off
 MISSED, BROKEN = 15.0, 75.0  # price of what a terminal row misses, and of what all rows without P do
-RIPPLE = 5e-4  # the program prefers means of T to T at instants, whose multipliers let q ripple
 QUICK = 0.01  # a lag below this is left out: a quicker torque can do all that a slower one does
 
 
 class Phase(NamedTuple):
-    """One cell. `most`: of T where the shaft enters contact, as a share of P where it is free.
+    """One cell. `most`: of T where the shaft enters contact.
 
-    `joins`: the first free cell; y begins with z, or within 0 and `begin`.
+    `joins`: the first free cell; y begins with z.
     """
 
     shaft: Literal["open", "enter", "contact", "free"]
@@ -47,7 +44,6 @@ class Phase(NamedTuple):
     length: float
     most: float = 0.0
     joins: bool = False
-    begin: float = -1.0
 
 
 class Row(NamedTuple):
@@ -80,36 +76,24 @@ class Model:
         self.slow = self.ramped or self.lag > 0.0
         self.demand = R if self.lag > 0.0 and self.ramped else U
         self.T = np.array([1.0, self.d, -self.d, 0.0, 0.0, 0.0, 0.0, 0.0])  # of x, in contact
-        self.x0 = np.eye(8)[Z] * self.z0
-        self.half = half_period(drive) * Omega  # no push on the shaft lowers T sooner
+        self.x0 = np.eye(8)[Z] * self.z0 + np.eye(8)[Y] * max(self.z0, 0.0)  # y of starts in the free phase
         assert problem.start_time is not None
         self.end = problem.start_time * Omega * (1.0 + ROUNDING)
-        self.least = self.mc + self.W / (self.mu2 * self.end)  # P, by momentum alone
+        self.lasts = self.shortest_contact(drive)
         self.steps = dict[Phase, Step]()
 
-    @cached_property
-    def drag(self) -> float:
-        """(Friction of the motor)/J1 - (load torque)/J2, if above 0: z'' is no lower by itself."""
+    def shortest_contact(self, drive: Drive) -> float:
+        """No first contact is shorter: half a period, unless friction of the motor can hold the push back."""
         pull = 0.0 if self.sticks or (self.pulls and self.b2 > 0.0) else self.mc
         falling = math.exp(-self.mu2 * self.b2 * self.end)  # as the load falls viscous friction holds it back
         most = self.F + self.b1 * self.mu1 * self.hi * self.end
-        return max(0.0, self.mu1 * most - self.mu2 * pull * falling)
-
-    @cached_property
-    def lasts(self) -> float:
-        """No first contact is shorter."""
-        return (self.drag == 0.0) * self.half * (0.5 if self.z0 > 0.0 else 1.0) * (1.0 - 1e-9)
-
-    @cached_property
-    def quickest(self) -> float:
-        """No contact has a larger z' than so much times P, else T would exceed P."""
-        step, x = expm(np.array([[0.0, 1.0], [-1.0, -self.d]]) * (self.half / 400)), np.array([0.0, 1.0])
-        path = [x, *(x := step @ x for _ in range(400))]
-        return 1.0 / max(float(z + self.d * v) for z, v in path) + 0.5 * self.half * self.drag / self.least
+        if self.mu1 * most > self.mu2 * pull * falling:
+            return 0.0
+        return half_period(drive) * self.Omega * (0.5 if self.z0 > 0.0 else 1.0) * (1.0 - 1e-9)
 
     def matrices(self, phase: Phase) -> tuple[Matrix, Vector, Matrix]:
         """A, g, B."""
-        A, g, B = np.zeros((8, 8)), np.zeros(8), np.zeros((8, 6))
+        A, g, B = np.zeros((8, 8)), np.zeros(8), np.zeros((8, 5))
         moves, lag = phase.load != "rests", self.lag
         A[Z, W1], A[Z, W2] = 1.0, -1.0
         A[W1, W1], B[W1, RUB] = -self.b1 * self.mu1, -self.mu1
@@ -162,59 +146,49 @@ class Model:
 class Step:
     """One cell of a phase: its transition, and what encloses the integrals over its steps.
 
-    `ends` are the corners of what the inputs can be, for each group of them; those of `shared`, the torques
-    of a free shaft, are to be multiplied by P.
+    Inputs lie between `low` and `high`, those of a free shaft between the corners `shared`, times P.
     """
 
     def __init__(self, model: Model, phase: Phase) -> None:
         self.A, self.g, self.B = A, g, B = model.matrices(phase)
-        self.E, self.fixed, self.G = _over(A, g, B, phase.length)
-        self.limits, unit = model.limits(phase), np.eye(6)
-        self.ends = [np.outer(pair, unit[one]) for one, pair in self.limits.items()]
-        self.shared: Matrix | None = None
+        motion = np.zeros((9 + B.shape[1],) * 2)  # of x, 1 and p
+        motion[:8] = np.column_stack([A, g, B])
+        whole = expm(motion * phase.length)[:8]
+        self.E, self.fixed, self.G = whole[:, :8], whole[:, 8], whole[:, 9:]
+        self.limits, unit = model.limits(phase), np.eye(5)
+        self.low, self.high = np.array([self.limits.get(one, (0.0, 0.0)) for one in range(5)]).T
+        self.shared = np.zeros((1, 5))
         self.inputs = list(self.limits)
         if phase.shaft == "free" and phase.load != "rests":
-            one = np.array([phase.most * unit[PUSH], unit[PULL]])
-            self.shared = np.vstack([np.zeros(6), one, *([-one] if model.pulls else [])])
+            one = unit[[PUSH, PULL]]
+            self.shared = np.vstack([np.zeros(5), one, *([-one] if model.pulls else [])])
             self.inputs += [PUSH, PULL]
-        if phase.joins and phase.begin >= 0.0:
-            self.G[:, BEGIN], self.limits[BEGIN] = self.E[:, Y], (0.0, phase.begin)
-            self.inputs.append(BEGIN)
-        elif phase.joins:
-            self.E[:, Z] += self.E[:, Y]
+            self.signs = np.array(
+                [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)][: 4 if model.pulls else 1]
+            )
         if phase.joins:
+            self.E[:, Z] += self.E[:, Y]
             self.E[:, Y] = 0.0
         slowest = [one for one in (model.lag, model.d * (phase.shaft == "free")) if one > 0.0]
         wanted = max([STEPS, *(math.ceil(phase.length / (0.35 * one)) for one in slowest)])
         self.parts = min(wanted, MOST_STEPS)
         self.length = h = phase.length / self.parts
-        one, drift, self.over = _over(A, g, np.eye(8), h)
-        every, drifts = [np.eye(8)], [np.zeros(8)]
+        one, every = expm(motion[:9, :9] * h), [np.eye(9)]
         for _ in range(self.parts):
             every.append(one @ every[-1])
-            drifts.append(one @ drifts[-1] + drift)
-        self.every, self.drifts = np.array(every), np.array(drifts)
+        self.every, self.drifts = np.array(every)[:, :8, :8], np.array(every)[:, :8, 8]
         off = np.abs(A) * h
         np.fill_diagonal(off, 0.0)
         self.grown = expm(off)  # |E(s)| is nowhere larger, as the diagonal of A only decays
 
 
-def _over(A: Matrix, g: Vector, B: Matrix, h: float) -> tuple[Matrix, Vector, Matrix]:
-    """(E, fixed, G) of x(h) = E x(0) + fixed + G p, with p constant."""
-    M = np.zeros((9 + B.shape[1],) * 2)
-    M[:8] = np.column_stack([A, g, B]) * h
-    whole = expm(M)[:8]
-    return whole[:, :8], whole[:, 8], whole[:, 9:]
-
-
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The cells of a box up to the end of the tail, its rows, terminal equations G x = e at node `end`."""
+    """The cells of a box up to the end, its rows by nodes, terminal equations G x = e at the end."""
 
     cells: list[Phase]
     rows: list[Row]
     terminal: list[tuple[Vector, float]]
-    end: int
     before: int  # so many cells lie before the start that the program is for
 
     def groups(self) -> Iterator[tuple[Phase, Indices]]:
@@ -223,12 +197,6 @@ class Layout:
         for k, cell in enumerate(self.cells):
             where.setdefault(cell, []).append(k)
         return ((cell, np.array(places)) for cell, places in where.items())
-
-    def after(self) -> Layout:
-        """From the start of the program on."""
-        k = self.before
-        rows = [row._replace(node=row.node - k) for row in self.rows if row.node > k]
-        return Layout(self.cells[k:], rows, self.terminal, self.end - k, 0)
 
 
 class Multipliers(NamedTuple):
@@ -242,147 +210,54 @@ class Multipliers(NamedTuple):
 # good multipliers: a linear program -------------------------------------------------------------------------
 
 
-class _Quiet(highspy.Highs):
-    def enableCallbacks(self) -> None:  # to enable them prints a line, and none is needed
-        pass
-
-
-class _Program:
-    """minimise P over x at the nodes and inputs that are constant in each cell, rows and equations held.
-
-    What terminal equations miss, and one common miss of all rows without P, have a price: there is always an
-    answer. Columns: x by nodes, inputs by cells, P, misses.
-    """
-
-    def __init__(self, model: Model, at: Layout) -> None:
-        free = model.d > 0.0 and any(cell.shaft == "free" for cell in at.cells)
-        kept = [Z, W1, W2, *[U] * model.slow, *[R] * (model.demand == R), *[Y] * free]
-        self.model, self.at, self.kept = model, at, kept
-        self.n, N = len(kept), len(at.cells)
-        self.parts = list[tuple[Any, ...]]()
-        self.inputs, self.width = np.zeros(N, int), self.n * (N + 1)
-        low, high = [np.full(self.width, -np.inf)], [np.full(self.width, np.inf)]
-        low[0][: self.n] = high[0][: self.n] = model.x0[kept]
-        for phase, ks in at.groups():
-            step = model.step(phase)
-            self.inputs[ks] = self.width + len(step.inputs) * np.arange(ks.size)
-            self.width += len(step.inputs) * ks.size
-            shared = (-np.inf if model.pulls else 0.0, np.inf)
-            pairs = np.array([step.limits.get(one, shared) for one in step.inputs])
-            low.append(np.tile(pairs[:, 0], ks.size))
-            high.append(np.tile(pairs[:, 1], ks.size))
-        K = len(at.terminal)
-        self.cost = np.append(np.zeros(self.width), [1.0, *[MISSED] * 2 * K, BROKEN])
-        low.append(np.zeros(2 + 2 * K))
-        high.append(np.full(2 + 2 * K, np.inf))
-        self.low, self.high = np.concatenate(low), np.concatenate(high)
-
-    def put(self, rows: ArrayLike, columns: ArrayLike, values: ArrayLike) -> None:
-        """Entries of the matrix."""
-        many = np.broadcast_arrays(rows, columns, values)
-        self.parts.append(tuple(one.ravel() for one in many))
-
-    def motion(self) -> Vector:
-        """States at the ends of cells less what they come to; the constants of that."""
-        n, value = self.n, np.zeros(self.n * len(self.at.cells))
-        every = np.arange(value.size)
-        self.put(every, every + n, 1.0)
-        for phase, ks in self.at.groups():
-            step = self.model.step(phase)
-            E, G = step.E[np.ix_(self.kept, self.kept)], step.G[np.ix_(self.kept, step.inputs)]
-            for matrix, first in ((E, n * ks), (G, self.inputs[ks])):
-                i, j = np.nonzero(np.abs(matrix) > 1e-13)
-                self.put(n * ks[:, None] + i, first[:, None] + j, -matrix[i, j])
-            value[(n * ks[:, None] + np.arange(n)).ravel()] = np.tile(step.fixed[self.kept], ks.size)
-        return value
-
-    def rows(self, count: int) -> Vector:
-        """The rows; their right sides."""
-        n, at = self.n, self.at
-        node, p = np.array([row.node for row in at.rows]), np.array([row.p for row in at.rows])
-        G, limit = np.array([row.G for row in at.rows]), np.array([row.g for row in at.rows])
-        here, own = count + np.arange(node.size), np.arange(n)
-        throughout = G[:, [MEAN, RAMPED]].any(axis=1)
-        i, j = np.nonzero(G[:, self.kept])
-        self.put(here[i], n * node[i] + j, G[:, self.kept][i, j])
-        for phase, ks in at.groups():
-            step = self.model.step(phase)
-            these = np.flatnonzero(throughout & np.isin(node - 1, ks))
-            k = node[these] - 1
-            self.put(here[these, None], n * k[:, None] + own, (G[these] @ step.E)[:, self.kept])
-            columns = self.inputs[k][:, None] + np.arange(len(step.inputs))
-            self.put(here[these, None], columns, (G[these] @ step.G)[:, step.inputs])
-            limit[these] -= G[these] @ step.fixed
-        self.put(here, self.width, -p * np.where(throughout, 1.0, 1.0 + RIPPLE))
-        self.put(here[p == 0.0], self.cost.size - 1, -1.0)
-        for t, (by, _) in enumerate(at.terminal, count + node.size):
-            self.put(t, n * at.end + own, by[self.kept])
-            self.put(t, self.width + 1 + 2 * (t - count - node.size) + np.arange(2), np.array([1.0, -1.0]))
-        return limit
-
-    def shared(self, count: int) -> int:
-        """|T| on both flanks of a free shaft in all no more than P; how many rows there are then."""
-        signs = [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)][: 4 if self.model.pulls else 1]
-        for phase, ks in self.at.groups():
-            step = self.model.step(phase)
-            if step.shared is None:
-                continue
-            for one, other in signs:
-                here = count + np.arange(ks.size)
-                first = self.inputs[ks] + step.inputs.index(PUSH)
-                self.put(here, first, one / phase.most)
-                self.put(here, first + 1, other)
-                self.put(here, self.width, -1.0)
-                count += ks.size
-        return count
-
-    def solve(self) -> Multipliers | None:
-        """Duals and value; None where HiGHS finds no end."""
-        value, at = self.motion(), self.at
-        limit, e = self.rows(value.size), np.array([e for _, e in at.terminal])
-        count = self.shared(first := value.size + limit.size + e.size)
-        i, j, entries = (np.concatenate(one) for one in zip(*self.parts, strict=True))
-        A = sparse.csr_matrix((entries, (i, j)), shape=(count, self.cost.size))
-        program, solver = highspy.HighsLp(), _Quiet()  # type: ignore[no-untyped-call]
-        program.num_row_, program.num_col_ = A.shape
-        program.col_cost_, program.col_lower_, program.col_upper_ = self.cost, self.low, self.high
-        rest = np.full(count - first, -np.inf)
-        program.row_lower_ = np.concatenate([value, np.full(limit.size, -np.inf), e, rest])
-        program.row_upper_ = np.concatenate([value, limit, e, np.zeros(count - first)])
-        matrix = program.a_matrix_
-        matrix.format_ = highspy.MatrixFormat.kRowwise
-        matrix.start_, matrix.index_, matrix.value_ = A.indptr, A.indices, A.data
-        for name, option in OPTIONS.items():
-            solver.setOptionValue(name, option)
-        solver.passModel(program)
-        for way in ("ipx", "simplex"):  # the interior point ends without an answer now and then
-            solver.setOptionValue("solver", way)
-            solver.run()
-            if solver.getModelStatus() == highspy.HighsModelStatus.kOptimal:
-                break
-        else:
-            return None
-        _, inner, terminal, _ = np.split(
-            np.array(solver.getSolution().row_dual), [value.size, value.size + limit.size, first]
-        )
-        found = float(solver.getInfo().objective_function_value)
-        return Multipliers(np.maximum(-inner, 0.0), terminal, found)
-
-
-OPTIONS: dict[str, bool | int | str] = {  # with presolve many of these programs fail
-    "output_flag": False, "presolve": "off", "run_crossover": "off", "threads": 1,
-    "ipm_iteration_limit": 200, "simplex_iteration_limit": 10_000,
-}  # fmt: skip
-
-
 def good_multipliers(model: Model, at: Layout) -> Multipliers | None:
-    """Those of the linear program, for all rows of the box; None where it has no answer."""
-    by = _Program(model, at.after()).solve()
-    if by is None:
+    """Those of a linear program from the start of the layout on; None where it has no answer.
+
+    minimise P over x at the nodes and inputs constant in each cell, rows and equations held. What terminal
+    equations miss, and one common miss of all rows without P, have a price: there always is an answer.
+    Columns: x by nodes, inputs by cells, P, misses; rows: motion by cells, those of the layout, equations.
+    """
+    rows = [row._replace(node=row.node - at.before) for row in at.rows if row.node > at.before]
+    steps = [model.step(cell) for cell in at.cells[at.before :]]
+    free = model.d > 0.0 and any(cell.shaft == "free" for cell in at.cells)
+    kept = [Z, W1, W2, *[U] * model.slow, *[R] * (model.demand == R), *[Y] * free]
+    n = len(kept)
+    ends = n * (len(steps) + 1) + np.cumsum([0, *(len(step.inputs) for step in steps)])
+    P, broken = int(ends[-1]), int(ends[-1]) + 1 + 2 * len(at.terminal)
+    low, high, cost = np.full(broken + 1, -np.inf), np.full(broken + 1, np.inf), np.zeros(broken + 1)
+    low[:n] = high[:n] = model.x0[kept]
+    low[P:], cost[P], cost[P + 1 : broken], cost[broken] = 0.0, 1.0, MISSED, BROKEN
+    shared = (-np.inf if model.pulls else 0.0, np.inf)
+    for step, a, b in zip(steps, ends[:-1], ends[1:], strict=True):
+        low[a:b], high[a:b] = np.array([step.limits.get(one, shared) for one in step.inputs]).T
+    program = LinearProgram(cost, low, high)
+    for k, step in enumerate(steps):
+        E, G = step.E[np.ix_(kept, kept)], step.G[np.ix_(kept, step.inputs)]
+        moved = {n * k: -E, int(ends[k]): -G, n * (k + 1): np.eye(n)}
+        program.add(moved, step.fixed[kept], step.fixed[kept])
+    for node, group in itertools.groupby(rows, lambda row: row.node):
+        these, step = list(group), steps[node - 1]
+        G, p = np.array([row.G for row in these]), np.array([[row.p] for row in these])
+        inside = np.where(INTEGRALS, G, 0.0)
+        limit = np.array([row.g for row in these]) - inside @ step.fixed
+        parts = {n * node: G[:, kept], P: -p, broken: -1.0 * (p == 0.0)}
+        parts |= {
+            n * (node - 1): (inside @ step.E)[:, kept],
+            int(ends[node - 1]): (inside @ step.G)[:, step.inputs],
+        }
+        program.add(parts, limit)
+    for t, (by, e) in enumerate(at.terminal):
+        program.add({n * len(steps): by[None, kept], P + 1 + 2 * t: np.array([[1.0, -1.0]])}, e, e)
+    for k, step in enumerate(steps):
+        if step.shared.any():  # |T| on both flanks in all is no more than P
+            first = int(ends[k]) + step.inputs.index(PUSH)
+            program.add({first: step.signs, P: np.full((len(step.signs), 1), -1.0)}, 0.0)
+    if (found := program.interior()) is None:
         return None
-    rows = np.zeros(len(at.rows))
-    rows[[row.node > at.before for row in at.rows]] = by.rows
-    return by._replace(rows=rows)
+    duals, value = found
+    _, inner, terminal, _ = np.split(duals, n * len(steps) + np.cumsum([0, len(rows), len(at.terminal)]))
+    inner = np.append(np.zeros(len(at.rows) - len(rows)), np.maximum(-inner, 0.0))
+    return Multipliers(inner, terminal, value)
 
 
 # their worth ------------------------------------------------------------------------------------------------
@@ -401,15 +276,12 @@ def proved(model: Model, at: Layout, by: Multipliers) -> tuple[Vector, Vector]:
         (inside if throughout else jump)[row.node - throughout] += m * row.G
         (within if throughout else node)[row.node - throughout] += -m * row.g, m * row.p
     for m, (G, e) in zip(by.terminal, at.terminal, strict=True):
-        jump[at.end] -= m * G
-        node[at.end, 0] += m * e
-    lam, right, begun = np.zeros(8), np.empty((N, 8)), np.zeros(N)
+        jump[N] -= m * G
+        node[N, 0] += m * e
+    lam, right = np.zeros(8), np.empty((N, 8))
     for k in range(N - 1, -1, -1):
         right[k] = lam + jump[k + 1] + inside[k]
-        step, cell = model.step(at.cells[k]), at.cells[k]
-        lam = right[k] @ step.E
-        if cell.begin >= 0.0:
-            begun[k] = min(0.0, float(right[k] @ step.G[:, BEGIN]) * cell.begin)
+        lam = right[k] @ model.step(at.cells[k]).E
         lam[[MEAN, RAMPED]] = 0.0
     found: list[tuple[Matrix, Vector, Vector]] = [(np.empty(0),) * 3] * N
     for phase, ks in at.groups():
@@ -419,7 +291,6 @@ def proved(model: Model, at: Layout, by: Multipliers) -> tuple[Vector, Vector]:
         sums, bend = _inputs(step, every)
         sums += within[ks][:, None] * s
         sums[:, :, 0] += right[ks] @ step.drifts.T
-        sums[:, -1, 0] += begun[ks]
         large = np.abs(every[:, :-1]) @ step.grown
         bend += large @ (np.abs(step.A @ step.A @ model.x0) + np.abs(step.A @ step.g))
         for k, *one in zip(ks.tolist(), sums, every @ model.x0, bend, strict=True):
@@ -430,53 +301,39 @@ def proved(model: Model, at: Layout, by: Multipliers) -> tuple[Vector, Vector]:
 def _inputs(step: Step, every: Matrix) -> tuple[Matrix, Vector]:
     """(sum, factor of P) up to each step: integrals of max -q p over what the inputs can be; bend of the sum.
 
-    Where one corner is best throughout a step the integral is exact; elsewhere the trapezoid, and what
-    the curvature of q can add to it.
+    The trapezoid, of a convex function too high at worst, and what the curvature of q can add to it.
     """
     h, A, B = step.length, step.A, step.B
     large = np.abs(every[:, :-1]) @ step.grown  # bounds |lambda| in each step
     q, bent = every @ B, np.abs(every @ (A @ A @ B))
     curved = np.maximum(bent[:, :-1], bent[:, 1:]) + 0.5 * h * (large @ np.abs(A @ A @ A @ B))
-    slope, whole = large @ np.abs(A @ B), every[:, :-1] @ step.over @ B
-    sums, bend = np.zeros((*every.shape[:2], 2)), np.zeros(slope.shape[:2])
-    shared = [] if step.shared is None else [step.shared]
-    for number, ends in enumerate([*step.ends, *shared]):
-        f, most = -(q @ ends.T), np.abs(ends).max(axis=0)
-        best = f.argmax(axis=2)
-        top, next_best = f.max(axis=2), np.sort(f, axis=2)[:, :, -2]
-        off = curved @ most * (h * h / 8.0)
-        lead = np.minimum((top - next_best)[:, :-1], (top - next_best)[:, 1:])
-        clear = (best[:, :-1] == best[:, 1:]) & (lead > 2.0 * off)
-        exact = np.take_along_axis(-(whole @ ends.T), best[:, 1:, None], 2)[:, :, 0]
-        rough = 0.5 * h * (top[:, :-1] + top[:, 1:]) + (2.0 / 3.0) * h * off
-        worth = np.cumsum(np.where(clear, exact, rough), axis=1)
-        if number < len(step.ends):
-            sums[:, 1:, 0] -= worth
-        else:
-            sums[:, 1:, 1] += worth
-        bend += slope @ most
+    own = np.maximum(-q * step.low, -q * step.high).sum(axis=2)
+    shared = (-(q @ step.shared.T)).max(axis=2)
+    sums, bend = np.zeros((*every.shape[:2], 2)), np.zeros((len(every), step.parts))
+    for column, sign, worth, ends in ((0, -1.0, own, [step.low, step.high]), (1, 1.0, shared, step.shared)):
+        most = np.abs(ends).max(axis=0)
+        rough = 0.5 * h * (worth[:, :-1] + worth[:, 1:]) + h**3 / 12.0 * (curved @ most)
+        sums[:, 1:, column] = sign * np.cumsum(rough, axis=1)
+        bend += large @ np.abs(A @ B) @ most
     return sums, bend
 
 
 def _from_the_end(
     model: Model, at: Layout, found: list[tuple[Matrix, Vector, Vector]], node: Matrix
 ) -> tuple[Vector, Vector]:
-    """The sums over all cells, from the end of the tail back to each step."""
+    """The sums over all cells, from the end back to each step."""
     N, edges, bounds = len(at.cells), list[Vector](), list[Vector]()
-    total, size = node[N].copy(), float(np.abs(node[N, 0]))
-    now = -sum(cell.length for cell in at.cells[at.end :])
+    total, now = node[N].copy(), 0.0
+    size = np.abs(node[:, 0]).sum() + sum(np.abs(sums[:, 0]).sum() + np.abs(x).max() for sums, x, _ in found)
     for k in range(N - 1, -1, -1):
         step, (sums, x, bend) = model.step(at.cells[k]), found[k]
-        size += float(np.abs(np.diff(sums[:, 0])).sum())
         F = total[0] + sums[:, 0] + x
         # between the edges the sum is above its chord less this
-        least = np.minimum(F[:-1], F[1:]) - bend * (step.length**2 / 8.0)
-        least -= ROUNDING * (size + float(np.abs(x).max()))
+        least = np.minimum(F[:-1], F[1:]) - bend * (step.length**2 / 8.0) - ROUNDING * size
         factor = total[1] + sums[1:, 1]
         P = np.divide(least, factor, out=np.full(least.size, math.inf), where=factor > 0.0)
         bounds.append(np.where(least > 0.0, P, 0.0))
         edges.append(now + step.length * np.arange(step.parts, dtype=np.float64))
         now += at.cells[k].length
         total += sums[-1] + node[k]
-        size += float(np.abs(node[k, 0]))
     return np.append(np.concatenate(edges), now), np.concatenate(bounds)

@@ -15,6 +15,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 
 ITERATIONS = 20  # for each column: a few programs never end
+MOST_INTERIOR = 200  # iterations
 
 
 @cache
@@ -69,6 +70,23 @@ class LinearProgram:
         places = np.broadcast_to(columns, whole.shape)[used].astype(np.int32)
         limits = [np.array(np.broadcast_to(one, (count,)), dtype=float) for one in (least, most)]
         self._highs.addRows(count, *limits, places.size, begins[:-1], places, whole[used])
+
+    def interior(self) -> tuple[Vector, float] | None:
+        """Duals of the rows in the middle of the best ones, and the least cost; None where none is found.
+
+        >>> program = LinearProgram(np.array([1.0]), np.zeros(1), np.full(1, 9.0))
+        >>> program.add({0: np.array([[1.0]])}, 9.0, 2.0)
+        >>> [round(float(one), 6) for one in (*program.interior()[0], program.interior()[1])]
+        [1.0, 2.0]
+        """
+        for name, value in (("run_crossover", "off"), ("ipm_iteration_limit", MOST_INTERIOR)):
+            self._highs.setOptionValue(name, value)
+        for way in ("ipx", "simplex"):  # the interior point ends without an answer now and then
+            self._highs.setOptionValue("solver", way)
+            if self.solved() is not None:
+                duals = np.array(self._highs.getSolution().row_dual)
+                return duals, float(self._highs.getInfo().objective_function_value)
+        return None
 
     def solved(self) -> Vector | None:
         """The best x; None where none is found."""

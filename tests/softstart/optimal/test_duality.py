@@ -110,7 +110,7 @@ def test_no_start_is_below(seed: int, quick: None) -> None:
 def search(problem: Problem, k_dyn: float) -> tuple[float, float]:
     """Both bounds without that of momentum."""
     drive: Any = problem.drive
-    found = duality._Search(problem, drive, k_dyn).both(10_000)
+    found = duality._Search(problem, drive, k_dyn).both(20_000)
     return tuple(peak * float(drive.Ms) / problem.base_torque for peak in found)  # type: ignore[return-value]
 
 
