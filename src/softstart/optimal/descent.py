@@ -38,9 +38,11 @@ STEPS, TASTE = 60, 12
 GOOD, POOR, ACCEPTED = 0.7, 0.3, 0.05  # share of the promised decrease that came true
 REFUSED = 0.3  # by what a step that is refused narrows the trust region
 CORRECTED = 2  # Newton steps towards the terminal condition, before a step that misses it is refused
+RESERVE = 1e-8  # share by which speeds that are asked for alone are exceeded
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
 JUMP, HALVED = 0.04, 32  # bend of the torque, in highest torques, beside which intervals are halved; so many
 STALLED = 3e-4  # of the merit: a gain on a finer grid after which a descent goes on
+INSIDE = 0.02  # of an interval, that a new step keeps from its ends
 SWITCH, LEVEL = 0.25, 0.02  # change of the torque, in highest torques, that becomes a step between two levels
 
 
@@ -91,7 +93,9 @@ class Descent(Search):
                     tried is not None
                     and gained <= ACCEPTED * promised < tried.merit(penalty) - tried.objective
                 ):
-                    nearer = self.finished(tried, rounds=CORRECTED)
+                    nearer = self.finished(
+                        tried, rounds=CORRECTED, along=(model.terminal, model.rates / found.end)
+                    )
                     if nearer is not None and nearer.merit(penalty) < tried.merit(penalty):
                         tried, gained = nearer, merit - nearer.merit(penalty)
                 if promised < least * merit and not (model.squares and trust > NARROW):
@@ -104,8 +108,9 @@ class Descent(Search):
             found, trust = better, min(trust, MOST_TRUST)
         return found
 
-    def refined(self, found: Found, times: int = 4, least: float = 3e-5) -> Found:
+    def refined(self, found: Found, times: int = 8, least: float = 1e-5) -> Found:
         """The same on finer grids, where the torque changes much between two knots."""
+        gainless = 0
         for number in range(times):
             finer = self.with_switches(found.demand) if number == 0 and self.switches else None
             finer = finer or self._halved(found.demand)
@@ -116,7 +121,8 @@ class Descent(Search):
                 break
             gained = found.merit() - down.merit()
             found = down if gained > 0.0 else found
-            if gained < least * found.merit() and number > 0:
+            gainless = gainless + 1 if gained < least * found.merit() else 0
+            if gainless > 1:
                 break
             if gained > STALLED * found.merit():  # far from its end: from a wide trust region again
                 found = self._down(found, STEPS // 2, least, PENALTY) or found
@@ -159,21 +165,27 @@ class Descent(Search):
                 area = sum(
                     0.5 * (torque[k] + torque[k + 1] - 2.0 * b) * (time[k + 1] - time[k]) for k in range(i, j)
                 )
-                at = min(max(time[i] + area / (a - b), time[i]), time[j])
+                apart = INSIDE * (time[j] - time[i])  # steeper than any machine, two knots that nearly meet
+                at = min(max(time[i] + area / (a - b), time[i] + apart), time[j] - apart)
                 time[i + 1 : j], torque[i + 1 : j], new = [at, at], [a, b], True
                 i += 2
                 break
             i += 1
         return self.demand(np.array(time), np.array(torque)) if new else None
 
-    def finished(self, found: Found, reserve: float = 1e-8, rounds: int = 8) -> Found | None:
-        """The same with the terminal condition met to rounding, by the smallest changes of the unknowns."""
+    def finished(
+        self, found: Found, rounds: int = 8, along: tuple[Matrix, Vector] | None = None
+    ) -> Found | None:
+        """The same with the terminal condition met to rounding, by the smallest changes of the unknowns.
+
+        `along` are the derivatives of the terminal quantities, where those of a start beside it will do.
+        """
         reached = self.problem.terminal == "reached"
         for _ in range(rounds):
             if found.lacking.max() <= (0.0 if reached else 1e-10):
                 return found
-            demand, (rows, rates) = found.demand, self.terminal_rows(found)
-            missing = np.where(found.lacking > 0.0, found.missing + (reserve if reached else 0.0), 0.0)
+            demand, (rows, rates) = found.demand, along or self.terminal_rows(found)
+            missing = np.where(found.lacking > 0.0, found.missing + (RESERVE if reached else 0.0), 0.0)
             low = np.concatenate([self.low - demand.torque, np.zeros(demand.steps.size)]) / self.high
             high = np.concatenate([self.high - demand.torque, np.zeros(demand.steps.size)]) / self.high
             if demand.steps.size:

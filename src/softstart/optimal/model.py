@@ -177,7 +177,7 @@ class Model:
         P, h, missed = n, n + 1, n + 2
         self.curve_at = missed + misses
         k_dyn, heat, steps = self.curve_at + 1, self.curve_at + 2, self.curve_at + 3
-        self.steps_at, self.squares_at = steps, steps + knots - 1
+        self.steps_at, self.squares_at = steps, steps + 2 * (knots - 1)
         size = self.squares_at + len(self.squares)
         cost = np.zeros(size)
         cost[missed:steps] = penalty
@@ -195,8 +195,7 @@ class Model:
             program.add({0: self.terminal, h: ends, missed: none}, found.missing)
         rise = np.diff(np.eye(knots), axis=0)
         now, single = np.diff(found.demand.torque) / search.high, np.eye(knots - 1)
-        program.add({0: rise, steps: -single}, -now)
-        program.add({0: rise, steps: single}, math.inf, -now)
+        program.add({0: rise, steps: np.hstack([-single, single])}, -now, -now)
         if math.isfinite(search.rate):
             most = search.rate / search.high * np.diff(found.demand.time)
             program.add({0: rise}, most - now, -most - now)
@@ -289,7 +288,8 @@ class Model:
         peak = found.peak / self.search.base
         x[self.curve_at + 1] = max(peak / problem.k_dyn - 1.0, 0.0) if problem.k_dyn else 0.0
         x[self.curve_at + 2] = max(found.heat / problem.heat - 1.0, 0.0) if problem.heat else 0.0
-        x[self.steps_at : self.squares_at] = np.abs(np.diff(found.demand.torque)) / self.search.high
+        rise = np.diff(found.demand.torque) / self.search.high
+        x[self.steps_at : self.squares_at] = np.concatenate([rise, -rise]).clip(min=0.0)
         return x
 
     def _value(self, x: Vector) -> float:

@@ -13,7 +13,7 @@ limits of the torque at random instants, by their exact starts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
@@ -30,8 +30,9 @@ from softstart.optimal.torque_speed import rigid_start_time
 from softstart.profile import TorqueProfile
 
 SAMPLES, FOLLOWED, FINISHED = 100, 10, 4  # first demands of the shortest start: played, tasted, to the end
-ROUGHLY = 0.3  # what is missed, beside the time, in the order of first demands
-FIRSTS = 3  # demands that a search begins with
+HOPELESS = 0.1  # share of a target speed that is missed: under full torque by all masses, or after a taste
+ROUGHLY = 0.3, 2.0, 12.0  # what is missed, beside the time, in the orders of first demands
+FIRSTS, MORE = 3, 9  # pulses that a search begins with; with the others, where these lead to no easy start
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 CLOSE = 1.05  # latest time, by the shortest start found: there it is refined
 RUNGS, SPREAD = 9, 0.005  # of the way up: at the shortest time * (1 + spread * (2^k - 1))
@@ -40,10 +41,11 @@ LONG = 1.0, 1.4, 2.0, 3.0  # times a usual start: where an easy one is looked fo
 WIDE, NARROW, RISE = 0.1, 2e-3, 0.08  # of the start time: steps down; the rise of K_dyn that is aimed at
 MOST_RISE, LEAST = 0.2, 4e-3  # of K_dyn, above which a step is taken again shorter; the shortest that is
 LEFT = 3  # nodes at which the way down is better in succession: then the way up is left
-BEST, ALIKE = 2, 1.01  # starts that are refined, if they are so near to the best one
+BEST, ALIKE = 3, 1.01  # starts that are refined, if they are so near to the best one
 MILD = 1.15  # K_dyn up to which the way down is enough
 FOLLOWS, DEAR = 30, 2e3  # steps from a neighbour, and the penalty up to which they are tried again
 ROUGH = 1e-3  # of K_dyn: how exactly the rungs are found
+FARTHER = 0.1  # of the latest start time of the nodes: steps up, where none of them is easy
 BEND = 1e-3  # of the largest torque: what is kept of the knots of a neighbour
 TRIES = 800  # knots in all starts around one, where one torque serves several machines
 STRETCH, BUMPS, HEIGHT = 0.15, 10, 0.15  # of time; their number; of the highest torque
@@ -82,44 +84,49 @@ class Path:
             last = self._gentle[-1]
             search = self.descent(last.latest, "start_time")
             found += [last.found, self._ended(search.down(last.found.profile, least=ROUGH), search)]
-        return min((one for one in found if one), key=lambda one: one.end, default=None)
+        best = min((one for one in found if one), key=lambda one: one.end, default=None)
+        return None if best is None else self.first(self.descent(best.end), best)
 
     @cached_property
     def _quickest(self) -> Found | None:
         """The shortest start by descents on t_f."""
         least = max(momentum_shortest_time(self.problem), rigid_start_time(self.problem))
         latest = 1.5 * least + 2.0 * self.period
-        longest = LONGEST * (least + self.period)
-        while latest < longest:
-            found = self._shortest_within(latest)
-            if found is not None:
-                return found
+        longest = 2.0 * self._gentle[-1].latest if self._gentle else LONGEST * (least + self.period)
+        found = None
+        while found is None and latest < 2.0 * longest:
+            found = self._shortest_within(min(latest, longest))
             latest *= 2.0
-        return None
+        return found
 
     def _shortest_within(self, latest: float) -> Found | None:
         search = self.descent(latest, "start_time")
         full = search.play(search.onto(TorqueProfile([0.0], [search.high])))
-        if full is None:
+        if full is None or full.missing.min() > HOPELESS:
             return None
-        span = min(1.2 * full.end, latest)
+        span = min(max(1.2 * full.end, 0.6 * latest), latest)
         switching = [TorqueProfile([0.0], [search.high]), *seeds.switching(search, span, SAMPLES)]
-        return self.quickest(search, switching, () if self._gentle else self.gentle_firsts(search))
+        return self.quickest(search, switching, () if self._gentle else self.gentle_firsts(search)[0])
 
     def quickest(
         self, search: Descent, many: Iterable[TorqueProfile], more: Iterable[TorqueProfile]
     ) -> Found | None:
         """The shortest start by descents from the best of many first demands, and from more."""
-        easier = search
-        if self.problem.terminal == "steady":  # the torque that is asked for at the end misleads at first
-            easier = Descent(replace(self.problem, terminal="synchronous"), search.latest, "start_time")
-        played = [easier.play(easier.onto(one)) for one in many]
-        near = sorted((one for one in played if one), key=lambda one: one.merit(ROUGHLY))[:FOLLOWED]
-        after = [one for each in near if (one := easier.step_down(each)) is not None]
-        after.sort(key=Found.merit)
-        firsts = [search.play(one.demand, one.end) for one in after[:FINISHED]]
-        firsts += [search.play(search.onto(one)) for one in more]
-        ended = [one for each in firsts if (one := self._ended(search.down(each), search))]
+        played = [search.play(search.onto(one)) for one in many]
+        near = [one for one in played if one]
+        tasted = dict[float, Found]()  # by their ends: many lead to the same start
+        for roughly in ROUGHLY:
+            near.sort(key=lambda one: one.merit(roughly))
+            after = (search.step_down(one) for one in near[:FOLLOWED])
+            tasted |= {
+                round(one.end / search.latest, 6): one for one in after if one and one.missed < HOPELESS
+            }
+            del near[:FOLLOWED]
+        best = sorted(tasted.values(), key=Found.merit)[:FINISHED]
+        ended = [one for each in best if (one := self._ended(search.down(each), search))]
+        if not ended:
+            firsts = [search.play(search.onto(one)) for one in more]
+            ended = [one for each in firsts if (one := self._ended(search.down(each), search))]
         if not ended:
             return None
         best = min(ended, key=lambda one: one.end)
@@ -132,20 +139,25 @@ class Path:
 
     def searched(self, search: Descent) -> Found | None:
         """The best start by descents from first demands: closed forms and pulses."""
-        firsts = self.gentle_firsts(search)
+        first, later = self.gentle_firsts(search)
         damped = self._damped(search)
-        firsts += [] if damped is None else [damped]
-        after = [one for each in firsts if (one := search.step_down(search.play(search.onto(each))))]
-        after.sort(key=Found.merit)
-        ended = [down for one in after[:2] if (down := search.down(one, least=ROUGH)) and down.near]
-        return min(ended, key=Found.merit, default=None)
+        first += [] if damped is None else [damped]
+        best: Found | None = None
+        for several in (first, later):
+            after = [one for each in several if (one := search.step_down(search.play(search.onto(each))))]
+            after.sort(key=Found.merit)
+            ended = [down for one in after[:2] if (down := search.down(one, least=ROUGH)) and down.near]
+            best = min([*ended, *([best] if best else [])], key=Found.merit, default=None)
+            if self.easy(best):
+                break
+        return best
 
     def _damped(self, search: Descent) -> TorqueProfile | None:
         """For an undamped chain the answer with a little damping, which leads to a better one."""
         one, problem = self.players[0], self.problem
         if len(self.players) > 1 or one.joints < 2 or one.d.any():
             return None
-        known = next(iter(self.gentle_firsts(search)), None)
+        known = next(iter(self.gentle_firsts(search)[0]), None)
         for ratio in DAMPED:
             drive = problem.drive.with_damping_ratio(ratio)
             damped = Descent(replace(problem, drive=drive, base=problem.base or problem.drive), search.latest)
@@ -153,10 +165,11 @@ class Path:
             known = known if found is None else found.profile.simplified(BEND)
         return known
 
-    def gentle_firsts(self, search: Descent) -> list[TorqueProfile]:
-        """First demands of gentle starts: closed forms and pulses."""
+    def gentle_firsts(self, search: Descent) -> tuple[list[TorqueProfile], list[TorqueProfile]]:
+        """First demands of gentle starts, closed forms and pulses: the best, and others."""
         formulas = [seeds.pulse_coast_hold(search, player) for player in search.players]
-        return [*seeds.pulse_coast_level(search)[:FIRSTS], *[one for one in formulas if one is not None]]
+        pulses = seeds.pulse_coast_level(search)
+        return [*pulses[:FIRSTS], *[one for one in formulas if one is not None]], pulses[FIRSTS:MORE]
 
     def followed(self, search: Descent, *neighbours: Found | None) -> Found | None:
         """The best of one descent from the demand of each neighbour, as it is or scaled in time."""
@@ -186,7 +199,8 @@ class Path:
         search = self.descent(latest)
         ended = [] if near is None else [self._ended(search.down(near, least=ROUGH), search)]
         ended += [self._widened(search, self.searched(search))]
-        if not any(self.easy(one) for one in ended):
+        found = self._polished(search, ended) if any(map(self.easy, ended)) else None
+        if found is None:
             nodes = self._gentle
             gentle = next((one.found for one in nodes if one.latest <= latest), None)
             mild = MILD * float(self.problem.drive.mean_torque)
@@ -194,18 +208,26 @@ class Path:
                 nodes = self._nodes
             if self.shortest is not None and self.shortest.end <= latest <= self.shortest.end * (1.0 + EDGE):
                 return self.gentlest(self.shortest, latest)
+            while nodes and latest > (1.0 + FARTHER) * nodes[0].latest:
+                farther, known = (1.0 + FARTHER) * nodes[0].latest, nodes[0].found
+                beyond = self.descent(farther)
+                found = self.followed(beyond, known)
+                nodes.insert(0, Node(farther, min((one for one in (found, known) if one), key=self._figure)))
             below = next((one.found for one in nodes if one.latest <= latest), None)
             above = next((one.found for one in reversed(nodes) if one.latest > latest), None)
-            ended += [self.followed(search, below, above), below]
-        best = sorted((one for one in ended if one), key=self._figure)
-        polished = list[Found]()
-        for one in best:
-            if polished and (len(polished) == BEST or self._figure(one) > ALIKE * self._figure(polished[0])):
-                break
-            fine = self.polished(search, one)
-            polished += [] if fine is None else [fine]
-        found = min(polished, key=self._figure, default=None)
+            found = self._polished(search, [*ended, self.followed(search, below, above), below])
         return None if found is None else self.first(search, found)
+
+    def _polished(self, search: Descent, ended: Sequence[Found | None]) -> Found | None:
+        """The best start, from the best ones on finer grids."""
+        found: Found | None = None
+        best = sorted((one for one in ended if one), key=self._figure)
+        for one in best[:BEST]:
+            if found is None or self._figure(one) < ALIKE * self._figure(found):
+                start = search.play(one.demand, one.end)
+                fine = [self._ended(start and search.refined(start), search), self._ended(start, search)]
+                found = min((each for each in (found, *fine) if each), key=self._figure, default=None)
+        return found
 
     def _ended(self, found: Found | None, search: Descent) -> Found | None:
         found = found and search.finished(found)
@@ -240,12 +262,6 @@ class Path:
         ended = [one for each in downs if (one := self._ended(each and search.refined(each), search))]
         kept = [one for one in ended if one.peak <= most]
         return min(kept, key=lambda one: one.end, default=nodes[first].found), quicker
-
-    def polished(self, search: Descent, found: Found) -> Found | None:
-        """The same on finer grids, with the terminal condition met to rounding."""
-        start = search.play(found.demand, found.end)
-        ended = [found, self._ended(start and search.refined(start), search), self._ended(start, search)]
-        return min((one for one in ended if one and one.ends), key=self._figure, default=None)
 
     # nodes: the starts known at other times -----------------------------------------------------------------
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,7 +16,7 @@ from softstart.optimal.problem import Objective, Problem
 from softstart.optimal.starts import DemandRun, DemandSimulator, steady_shaft_torques, wanted
 from softstart.profile import TorqueProfile
 
-KNOTS, MOST_KNOTS = 14, 160  # even ones, in an elastic period and in all
+KNOTS, MOST_KNOTS = 8, 160  # even ones, in the mean of slowest and fastest period, and in all
 APART = 0.4  # of their distance, which they keep from knots that are known, so that these do not add up
 INSTANTS = 32  # of the fastest period, at which torques are limited
 PENALTY = 200.0  # of what is missed, as shares, beside the objective as a share
@@ -93,7 +93,7 @@ class Search:
         stiff = self.players[0].mean_torque(self.latest) / problem.starting_torque
         scales = {"k_dyn": self.base, "heat": stiff * stiff * self.latest, "start_time": self.latest}
         self.scale = scales[self.objective]
-        count = min(max(math.ceil(KNOTS * self.until / self.period), 24), MOST_KNOTS)
+        count = min(max(math.ceil(KNOTS * self.until / math.sqrt(fastest * self.period)), 24), MOST_KNOTS)
         self.even = np.linspace(0.0, self.until, count + 1)
 
     # demands -----------------------------------------------------------------------------------------------
@@ -126,8 +126,10 @@ class Search:
         if self.starts_at_initial:
             u[0] = min(max(self.initial, self.low), self.high)
         if math.isfinite(self.rate):
-            for i, rise in enumerate(self.rate * np.diff(demand.time)):
-                u[i + 1] = np.clip(u[i + 1], u[i] - rise, u[i] + rise)
+            levels = u.tolist()
+            for i, rise in enumerate((self.rate * np.diff(demand.time)).tolist()):
+                levels[i + 1] = min(max(levels[i + 1], levels[i] - rise), levels[i] + rise)
+            u = np.array(levels)
         return replace(demand, torque=u)
 
     # starts ------------------------------------------------------------------------------------------------
@@ -208,11 +210,23 @@ class Search:
         if self.problem.terminal == "reached":
             return lacking[[player.load]]
         if self.problem.terminal == "steady":
-            own = steady_shaft_torques(player.rows)
-            T, aim = state["T"][0], wanted(own, self.base, player.motor)
-            open_too = (T == 0.0) & (np.abs(own) < np.abs(aim))  # flanks apart carry nothing either
-            lacking = np.concatenate([lacking, np.where(open_too, 0.0, aim - T) / self.base])
+            lacking = np.concatenate([lacking, self._twisted(player, state)[0][0]])
         return lacking
+
+    def _twisted(self, player: DemandSimulator, state: Mapping[str, Vector]) -> tuple[Matrix, Vector]:
+        """What shaft torques lack at each instant, as shares of the base torque, and which shafts count.
+
+        While its flanks are apart, or the others press, a shaft also lacks the share of its gap that it has
+        still to cross: the torque alone would not say where to. Flanks that should carry nothing may be apart.
+        """
+        own = steady_shaft_torques(player.rows)
+        T, aim = state["T"], wanted(own, self.base, player.motor)
+        side = np.where(aim > 0.0, 1.0, -1.0)
+        wide = 2.0 * player.half_gap
+        across = (player.half_gap - side * state["twist"]) / np.where(wide > 0.0, wide, 1.0)
+        lacking = (aim - T) / self.base + side * np.where(wide > 0.0, across.clip(0.0, 1.0), 0.0)
+        counts = ~((T[0] == 0.0) & (np.abs(own) < np.abs(aim)))
+        return np.where(counts, lacking, 0.0), counts
 
     def terminal_rows(self, found: Found, answers: Sequence[Matrix] = ()) -> tuple[Matrix, Vector]:
         """By how much each terminal quantity rises, as a share, with each unknown, and with t_f.
@@ -229,9 +243,12 @@ class Search:
             if self.problem.terminal == "reached":
                 w, rate = w[[player.load]], rate[[player.load]]
             if self.problem.terminal == "steady":
-                closed = (at["T"][1] != 0.0).astype(float)
-                w = np.vstack([w, player.twisting(closed, answer) / self.base])
-                rate = np.concatenate([rate, (at["T"][2] - at["T"][0]) / (2.0 * beside * self.base)])
+                lacking, counts = self._twisted(player, at)
+                apart = counts & (at["T"][1] == 0.0) & (player.half_gap > 0.0)
+                twisting = player.twisting((at["T"][1] != 0.0).astype(float), answer) / self.base
+                twisting[apart] = answer[:joints][apart] / (2.0 * player.half_gap[apart, None])
+                w = np.vstack([w, twisting])
+                rate = np.concatenate([rate, (lacking[0] - lacking[2]) / (2.0 * beside)])
             rows.append(w)
             rates.append(rate)
         return np.vstack(rows), np.concatenate(rates)

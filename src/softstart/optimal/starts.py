@@ -119,6 +119,7 @@ class DemandSimulator:
         self.period, self.target = float(record.period), float(record.target)
         self.motor, self.load, self.joints = int(record.motor), int(record.load), shafts.size
         self.J, self.c, self.d = masses["J"], shafts["c"], shafts["d"]
+        self.half_gap = shafts["half_gap"]
         fastest = math.sqrt(float((self.c * (1.0 / self.J[:-1] + 1.0 / self.J[1:])).max()))
         self.fastest = 2.0 * math.pi / fastest
         self._loads = float((masses["Mc"] + masses["active"]).sum())
