@@ -29,7 +29,7 @@ import numpy as np
 from softstart.arrays import Matrix, Vector
 from softstart.optimal.demand import Demand
 from softstart.optimal.model import LET_THROUGH, Model
-from softstart.optimal.search import PENALTY, Found, Search
+from softstart.optimal.search import MOST_KNOTS, PENALTY, Found, Search
 from softstart.profile import TorqueProfile
 
 SOFT, DEAREST = 2.0, 1e5  # penalty of what is missed at first; up to which it rises
@@ -41,6 +41,7 @@ CORRECTED = 2  # Newton steps towards the terminal condition, before a step that
 RESERVE = 1e-8  # share by which speeds that are asked for alone are exceeded
 NARROW = 3e-3  # trust from which on tangent planes are as good as their square
 JUMP, HALVED = 0.04, 32  # bend of the torque, in highest torques, beside which intervals are halved; so many
+FEW, ROUGH = 4, 1e-4  # times that large demands are refined, and how exactly
 STALLED = 3e-4  # of the merit: a gain on a finer grid after which a descent goes on
 INSIDE = 0.02  # of an interval, that a new step keeps from its ends
 SWITCH, LEVEL = 0.25, 0.02  # change of the torque, in highest torques, that becomes a step between two levels
@@ -114,8 +115,10 @@ class Descent(Search):
         for number in range(times):
             finer = self.with_switches(found.demand) if number == 0 and self.switches else None
             finer = finer or self._halved(found.demand)
-            if finer is None:
+            if finer is None or (number >= FEW and finer.size > MOST_KNOTS):
                 break
+            if finer.size > MOST_KNOTS:
+                least = ROUGH
             down = self._down(self.play(finer, found.end), STEPS // 2, least, PENALTY)
             if down is None:
                 break

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -29,9 +29,9 @@ from softstart.optimal.starts import DemandSimulator
 from softstart.optimal.torque_speed import rigid_start_time
 from softstart.profile import TorqueProfile
 
-SAMPLES, FOLLOWED, FINISHED = 100, 10, 4  # first demands of the shortest start: played, tasted, to the end
+SAMPLES, TASTED, FINISHED = 100, 10, 4  # first demands: played, tasted in each order, followed to the end
 HOPELESS = 0.1  # share of a target speed that is missed: under full torque by all masses, or after a taste
-ROUGHLY = 0.3, 2.0, 12.0  # what is missed, beside the time, in the orders of first demands
+ORDERS = 0.3, 2.0, 12.0  # what is missed, beside the time, in the orders of first demands
 FIRSTS, MORE = 3, 9  # pulses that a search begins with; with the others, where these lead to no easy start
 LONGEST = 100.0  # times what the inertia alone takes: no longer start is looked for
 CLOSE = 1.05  # latest time, by the shortest start found: there it is refined
@@ -109,24 +109,18 @@ class Path:
         return self.quickest(search, switching, () if self._gentle else self.gentle_firsts(search)[0])
 
     def quickest(
-        self, search: Descent, many: Iterable[TorqueProfile], more: Iterable[TorqueProfile]
+        self, search: Descent, many: Sequence[TorqueProfile], more: Iterable[TorqueProfile]
     ) -> Found | None:
         """The shortest start by descents from the best of many first demands, and from more."""
-        played = [search.play(search.onto(one)) for one in many]
-        near = [one for one in played if one]
-        tasted = dict[float, Found]()  # by their ends: many lead to the same start
-        for roughly in ROUGHLY:
-            near.sort(key=lambda one: one.merit(roughly))
-            after = (search.step_down(one) for one in near[:FOLLOWED])
-            tasted |= {
-                round(one.end / search.latest, 6): one for one in after if one and one.missed < HOPELESS
-            }
-            del near[:FOLLOWED]
-        best = sorted(tasted.values(), key=Found.merit)[:FINISHED]
-        ended = [one for each in best if (one := self._ended(search.down(each), search))]
+        tasting = [search]
+        if self.problem.terminal == "steady":  # the torque that is asked for at the end may mislead at first
+            easier = replace(self.problem, terminal="synchronous")
+            tasting.append(Descent(easier, search.latest, "start_time", self.players))
+        firsts = [one for each in tasting for one in self._tasted(each, many)]
+        downs = (search.down(search.play(one.demand, one.end)) for one in firsts)
+        ended = [one for each in downs if (one := self._ended(each, search))]
         if not ended:
-            firsts = [search.play(search.onto(one)) for one in more]
-            ended = [one for each in firsts if (one := self._ended(search.down(each), search))]
+            ended = [one for each in more if (one := self._ended(search.down(each), search))]
         if not ended:
             return None
         best = min(ended, key=lambda one: one.end)
@@ -134,6 +128,19 @@ class Path:
         again = finer.down(best.profile)
         again = again and finer.finished(finer.refined(again))
         return again if again and again.ends and again.end < best.end else best
+
+    def _tasted(self, search: Descent, many: Sequence[TorqueProfile]) -> list[Found]:
+        """What the best of first demands lead to after a few steps, by the time and by what they miss."""
+        near = [one for each in many if (one := search.play(search.onto(each)))]
+        tasted = dict[float, Found]()  # by their ends: many lead to the same start
+        for roughly in ORDERS:
+            near.sort(key=partial(Found.merit, penalty=roughly))
+            for each in near[:TASTED]:
+                one = search.step_down(each)
+                if one is not None and one.missed < HOPELESS:
+                    tasted[round(one.end / search.latest, 6)] = one
+            del near[:TASTED]
+        return sorted(tasted.values(), key=Found.merit)[:FINISHED]
 
     # one start time ----------------------------------------------------------------------------------------
 

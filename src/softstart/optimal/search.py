@@ -22,6 +22,7 @@ INSTANTS = 32  # of the fastest period, at which torques are limited
 PENALTY = 200.0  # of what is missed, as shares, beside the objective as a share
 ENDS = 257  # instants among which the end of a first demand is looked for
 MISSED, MET = 1e-5, 1e-8  # share by which a condition is missed: near to it, and kept
+ROUNDING = 1e-11  # share by which a speed may lie below one that is to be reached
 IN_LAG = 0.04  # of a torque lag, between instants at which a curve limits the torque
 BETWEEN = 5e-5  # of the highest torque: kept from the curve for what happens between the instants
 CALM = 1e-5  # weight of the total variation of the torque, in highest torques
@@ -41,6 +42,7 @@ class Found:
     over: float  # above the bounds on K_dyn and heat, as a share of them
     heat: float  # s
     objective: float  # as a share of its scale
+    met: float  # what of `lacking` is rounding
 
     def merit(self, penalty: float = PENALTY) -> float:
         """The objective, and what missing a condition costs."""
@@ -54,7 +56,7 @@ class Found:
     @property
     def ends(self) -> bool:
         """Whether it is a start that keeps all conditions."""
-        return self.missed <= MET
+        return self.missed <= MET and float(self.lacking.max()) <= self.met
 
     @property
     def near(self) -> bool:
@@ -163,7 +165,8 @@ class Search:
         lacking = np.maximum(missing, 0.0) if problem.terminal == "reached" else np.abs(missing)
         over = max(peak / (problem.k_dyn * self.base) - 1.0, 0.0) if problem.k_dyn else 0.0
         over += max(heat / problem.heat - 1.0, 0.0) if problem.heat else 0.0
-        return Found(demand, end, starts, peak, missing, lacking, beyond, over, heat, objective)
+        met = ROUNDING if problem.terminal == "reached" else MET
+        return Found(demand, end, starts, peak, missing, lacking, beyond, over, heat, objective, met)
 
     def _sooner(self, starts: Sequence[DemandRun]) -> bool:
         """Whether a demand should not end at the latest instant."""
@@ -217,7 +220,7 @@ class Search:
         """What shaft torques lack at each instant, as shares of the base torque, and which shafts count.
 
         While its flanks are apart, or the others press, a shaft also lacks the share of its gap that it has
-        still to cross: the torque alone would not say where to. Flanks that should carry nothing may be apart.
+        still to cross: torque alone would not say where to. Flanks that should carry nothing may be apart.
         """
         own = steady_shaft_torques(player.rows)
         T, aim = state["T"], wanted(own, self.base, player.motor)

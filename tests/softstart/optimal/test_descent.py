@@ -52,7 +52,7 @@ def test_what_a_small_step_promises_comes_true(name: str, objective: Any) -> Non
     search = Descent(problem, problem.start_time, None if objective == "own" else objective)
     found = begun(search)
     model, shares, penalty = Model(search, found), [], 20.0
-    for trust in (3e-4, 1e-4):
+    for trust in (1e-4, 3e-5):
         step = model.step(trust, penalty, 1e-5)
         assert step is not None
         change, later, promised = step
