@@ -135,6 +135,7 @@ ORDINARY = {
     ("arcmin", "rad"): 0.0002908882086657216,
     ("N*m/deg", "N*m/rad"): 57.29577951308232,
     ("N*m/arcmin", "N*m/rad"): 3437.746770784939,
+    ("kN*m", "N*m"): 1000.0,
     ("lbf*ft", "N*m"): 1.3558179483314003,
     ("hp", "W"): 745.6998715822702,
     ("ms", "s"): 0.001,
@@ -392,46 +393,67 @@ def shortest(value: float, unit: str, within: float = 0.0) -> str:
 
 
 class Units(NamedTuple):
-    """The units in which a person sees angles and speeds; everything else stays in SI.
+    """The units in which a person sees quantities, and the shaft, motor or output, at which they count.
 
     An angle in `mm` is the arc on a circle of this `diameter`, m: half of it is the lever, as for the
-    backlash of gears on their pitch circle.
+    backlash of gears on their pitch circle. The unit of torque is also that of stiffness, damping and rate of
+    torque. With a `gear` everything is seen at its output, by `Gear.to_output`; inertias stay in kg m2.
 
     >>> units = Units.read("deg, rpm")
     >>> units.of("rad"), round(units.shown(0.5, "rad"), 3), units.typed("4", "rad")
     ('deg', 28.648, '4 deg')
     >>> Units.read("mm on 80 mm").typed("0.3", "rad"), Units.read("").of("rad/s")
     ('0.0075', 'rad/s')
+    >>> from softstart.input.gear import Gear
+    >>> units = Units.read("arcmin, rpm, kN m, at output", gear=Gear(40.0, 0.8))
+    >>> units.of("N*m/rad"), units.shown(50.0, "N*m"), round(units.shown(0.1, "rad"), 3), units.at
+    ('kN*m/rad', 1.6, 8.594, ', at the output')
+    >>> units.typed("1.6", "N*m"), units.typed("9 arcmin", "rad"), units.at_motor.typed("9", "rad")
+    ('1.6 kN*m at output', '9 arcmin at output', '9 arcmin')
     """
 
     angle: str = "rad"
     speed: str = "rad/s"
     diameter: float = 0.0
+    torque: str = "N*m"
+    gear: Any = None  # `input.gear.Gear`, which reads with the help of this module
 
     @classmethod
-    def read(cls, text: str, angles: Iterable[float] = (), speeds: Iterable[float] = ()) -> Units:
-        """The units of a text as `deg, rpm` or `mm on 80 mm`; those that it leaves out as values are written.
+    def read(
+        cls, text: str, angles: Iterable[float] = (), speeds: Iterable[float] = (),
+        gear: object = 'without a gear nothing is "at output"',
+    ) -> Units:  # fmt: skip
+        """The units of a text as `deg, rpm, kN m` or `mm on 80 mm`; what it leaves out as values are written.
 
         The values are in SI: an angle that `shortest` writes in deg is one that somebody gave in deg; if
-        they all are, that is the unit. Raises `RefusedError` for a text that names no such units.
+        they all are, that is the unit. `at output` asks for the output of the `gear`, a `Gear`, or is
+        refused with this reason. Raises `RefusedError` for a text that names no such units, or two of a kind.
 
         >>> Units.read("", [0.06981317007977318], [92.1533845053006])
-        Units(angle='deg', speed='rpm', diameter=0.0)
+        Units(angle='deg', speed='rpm', diameter=0.0, torque='N*m', gear=None)
+        >>> Units.read("deg, at output")
+        Traceback (most recent call last):
+        softstart.quantities.RefusedError: without a gear nothing is "at output"
         """
         fields: dict[str, Any] = {}
         for part in filter(None, (one.strip() for one in text.split(","))):
-            arc = re.fullmatch(r"mm\s+on\s+(.+)", part)
+            arc, shaft = re.fullmatch(r"mm\s+on\s+(.+)", part), _SHAFT.fullmatch(part)
             if arc:
-                fields |= {"angle": "mm", "diameter": parse(arc[1], "m")}
-                if not fields["diameter"] > 0.0:
+                same: dict[str, Any] = {"angle": "mm", "diameter": parse(arc[1], "m")}
+                if not same["diameter"] > 0.0:
                     raise RefusedError("the diameter of the pitch circle must be above 0")
-            elif same := _same_unit(part):
-                fields |= same
-            else:
+            elif shaft:
+                same = {"gear": gear if shaft[1].lower() == "output" else None}
+                if isinstance(same["gear"], str):
+                    raise RefusedError(same["gear"])
+            elif not (same := _same_unit(part)):
                 raise RefusedError(
-                    f'{show(part)} is no unit of an angle or a speed; write for example "deg, rpm", or '
-                    '"mm on 80 mm" for the backlash on a pitch circle'
+                    f"{show(part)} is no unit of an angle, a speed or a torque, and no shaft; write for "
+                    'example "deg, rpm, kN m, at output", or "mm on 80 mm" for the backlash on a pitch circle'
                 )
+            if same.keys() & fields.keys():
+                raise RefusedError(f"{show(part)} is the second of its kind; name one")
+            fields |= same
         for key, si, values in (("angle", "rad", angles), ("speed", "rad/s", speeds)):
             written = {shortest(value, si).partition(" ")[2] for value in values if value}
             fields.setdefault(key, written.pop() or si if len(written) == 1 else si)
@@ -441,50 +463,100 @@ class Units(NamedTuple):
     def text(self) -> str:
         """What `read` reads back to these units.
 
-        >>> Units.read("mm on 80 mm, rpm").text
-        'mm on 0.08 m, rpm'
+        >>> Units.read("mm on 80 mm, rpm, kNm").text
+        'mm on 0.08 m, rpm, kN m'
         """
-        return f"{self.angle}{f' on {self.diameter!r} m' if self.diameter else ''}, {self.speed}"
+        angle = f"{self.angle}{f' on {self.diameter!r} m' if self.diameter else ''}"
+        torque = "" if self.torque == "N*m" else f", {self.torque.replace('*', ' ')}"
+        return f"{angle}, {self.speed}{torque}{', at output' if self.gear else ''}"
+
+    @property
+    def at(self) -> str:
+        """What a title or an axis adds, once: the shaft, where it is not that of the motor."""
+        return ", at the output" if self.gear else ""
+
+    @property
+    def at_motor(self) -> Units:
+        """The same units at the motor shaft."""
+        return self._replace(gear=None)
+
+    @property
+    def lossless(self) -> Units:
+        """The same units for limits, which are brought over without losses."""
+        return self._replace(gear=self.gear and self.gear.lossless)
 
     def of(self, si: str) -> str:
         """The unit in which a quantity of this SI unit is seen."""
+        if si in _OF_TORQUE:
+            return self.torque + si.removeprefix("N*m")
         return {"rad": self.angle, "rad/s": self.speed}.get(si, si)
+
+    def label(self, si: str) -> str:
+        """The same as headings and axes write it, in ASCII.
+
+        >>> Units(torque="kN*m").label("N*m/rad"), Units().label("kg*m^2")
+        ('kN m/rad', 'kg m2')
+        """
+        return self.of(si).replace("*", " ").replace("^", "")
 
     def size(self, si: str) -> float:
         """How much of the SI unit one of these is."""
         unit = self.of(si)
+        if si in _OF_TORQUE:
+            return ORDINARY.get((self.torque, "N*m"), 1.0)
         return 2e-3 / self.diameter if unit == "mm" and si == "rad" else ORDINARY.get((unit, si), 1.0)
 
     def shown(self, value: Any, si: str) -> Any:
-        """A value or an array in SI as it is seen."""
+        """A value or an array in SI at the motor shaft as it is seen."""
         size = self.size(si)
+        if self._is_at_output(si):
+            value = self.gear.to_output(value, si)
         return value if size == 1.0 else value / size
 
     def rounded(self, value: float, si: str, digits: int) -> float:
-        """The value in SI whose number in these units has so many digits.
+        """The value in SI at the motor shaft whose number in these units has so many digits.
 
         >>> Units.read("deg").rounded(0.0698, "rad", 3) == parse("4 deg", "rad")
         True
         """
-        return cast("float", parse(self.typed(f"{self.shown(value, si):.{digits}g}", si), si))
+        number = parse(self.at_motor.typed(f"{self.shown(value, si):.{digits}g}", si), si)
+        return cast("float", self.gear.to_motor(number, si) if self._is_at_output(si) else number)
 
     def typed(self, text: str, si: str) -> str:
-        """What a bare number in such a field means, as `parse` reads it; any other text stays as it is."""
+        """What a number in such a field means, as a parameter reads it; any other text stays as it is.
+
+        At the output a quantity with a unit of its own is there too.
+        """
         text = without_powers(text)
+        if self._is_at_output(si) and _QUANTITY.fullmatch(text.strip()):
+            return f"{self.at_motor.typed(text, si).strip()} at output"
         if self.of(si) == si or not _NUMBER.fullmatch(text.strip()):
             return text
         if self.of(si) == "mm":  # a length is no angle
             return f"{float(text) * self.size(si):.{MOST_DIGITS}g}"
         return f"{text.strip()} {self.of(si)}"
 
+    def _is_at_output(self, si: str) -> bool:
+        return self.gear is not None and self.gear.factor(si) is not None
 
-def _same_unit(written: str) -> dict[str, str]:
-    """The unit of an angle or a speed that somebody wrote, in any spelling, as a field of `Units`.
+
+_SHAFT = re.compile(r"at\s+(?:the\s+)?(output|motor)(?:\s+shaft)?", re.IGNORECASE)
+_OF_TORQUE = ("N*m", "N*m/s", "N*m/rad", "N*m*s/rad")
+# a number with or without a unit: no list, no multiple ("2x", "5 J1"), and not already "at output"
+_QUANTITY = re.compile(rf"{_NUMBER.pattern}(?!\s*(?:x|J1)$)(?:(?!\sat\s)[^,;])*", re.IGNORECASE)
+
+
+def _same_unit(written: str) -> dict[str, Any]:
+    """The unit of an angle, a speed or a torque that somebody wrote, in any spelling, as a field of `Units`.
 
     >>> _same_unit("rpm"), _same_unit("1/min"), _same_unit("degree"), _same_unit("N")
     ({'speed': 'rpm'}, {'speed': 'rpm'}, {'angle': 'deg'}, {})
+    >>> _same_unit("Nm"), _same_unit("kN m"), _same_unit("ft-lb")
+    ({'torque': 'N*m'}, {'torque': 'kN*m'}, {'torque': 'lbf*ft'})
     """
-    known = {"angle": ("rad", *TYPED["rad"]), "speed": ("rad/s", *TYPED["rad/s"])}
+    known = {
+        field: (si, *TYPED[si]) for field, si in (("angle", "rad"), ("speed", "rad/s"), ("torque", "N*m"))
+    }
     for field, units in known.items():
         if written in units:
             return {field: written}

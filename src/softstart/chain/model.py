@@ -88,7 +88,7 @@ class Chain(ParameterFile, Machine):
     assumed : str, optional
         Which values are assumed; it is printed with every output.
     units : str, optional
-        Units in which page and report show angles and speeds, as "deg, rpm"; by default as they were given.
+        Units in which results are shown, as "deg, rpm, kN m"; by default those of the values as given.
     brake_torque, closing_delay, opening_delay : float or str, optional
         Brake on the mass of the motor: torque with which it slips, N m (infinite: an ideal lock), and times
         from a command until it is closed and open, s. Any of them above 0 means that there is one.
@@ -156,7 +156,7 @@ class Chain(ParameterFile, Machine):
                 if mass.name == held and mass.initial_speed != 0.0:
                     reason = "the brake holds the motor, which stands still; leave it out, or [brake]"
                     yield wording.sentence(f"initial_speed = {mass.initial_speed!r}", reason)
-        yield from wrong_units(values, self.PARAMETERS["units"], wording)
+        yield from wrong_units(values, self.PARAMETERS["units"], wording, NO_OUTPUT)
 
     # ---- where chains come from --------------------------------------------------------------------------
 

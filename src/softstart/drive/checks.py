@@ -10,6 +10,7 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from softstart.arrays import Vector
+from softstart.input.gear import Gear
 from softstart.input.parameters import Parameter, Wording
 from softstart.quantities import RefusedError, Units, show
 
@@ -44,10 +45,13 @@ def mean_torque_of(M1: Numeric, J1: Numeric, J2: Numeric, Mc: Numeric) -> Numeri
     return (M1 * J2 + J1 * Mc) / (J1 + J2)
 
 
-def wrong_units(values: Values, parameter: Parameter, wording: Wording) -> Iterator[str]:
-    """A sentence if the units in which a machine is to be shown cannot be read."""
+def wrong_units(values: Values, parameter: Parameter, wording: Wording, gear: Gear | str) -> Iterator[str]:
+    """A sentence if the units in which a machine is to be shown cannot be read, or it has no such shaft.
+
+    `gear` is that to the output, or the reason why there is none.
+    """
     try:
-        Units.read(values.get(parameter.name, ""))
+        Units.read(values.get(parameter.name, ""), gear=gear)
     except RefusedError as refusal:
         yield wording.refused(parameter, values[parameter.name], refusal)
 

@@ -55,7 +55,7 @@ class Machine(ABC):
     Attributes
     ----------
     name, source, assumed, units : str
-        Title; source of the numbers; what is assumed; units in which page and report show it.
+        Title; source of the numbers; what is assumed; units in which results are shown.
     target_speed : float or None
         Speed that the load is to reach, rad/s; None for a chain that is only analysed.
     motor : Drive, Motor or None

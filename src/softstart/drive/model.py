@@ -122,8 +122,8 @@ class Drive(ParameterFile, Machine):
     source: str = parameter("source", "", "source of the numbers", '"data sheet"', default="")
     assumed: str = parameter("assumed", "", "what is assumed rather than known",
         '"efficiency 0.95; damping ratio 0.02"', default="")
-    units: str = parameter("units", "", "units in which page and report show angles and speeds", '"deg, rpm"',
-        default="")
+    units: str = parameter("units", "", "units and shaft in which results are shown",
+        '"arcmin, rpm, kN m, at output"', default="")
     motor_inertia: Number = parameter("motor.inertia", "kg*m^2", "inertia of the motor", '"0.035 kg*m^2"',
         "above 0", symbol="J1")
     starting_torque: Number = parameter("motor.starting_torque", "N*m", "starting torque of the motor",
@@ -298,7 +298,8 @@ class Drive(ParameterFile, Machine):
                 f"{label} is missing", "friction holds some of these loads at rest and others not; give it"
             )
         yield from contradicting_limits(values, self.PARAMETERS, wording)
-        yield from wrong_units(values, self.PARAMETERS["units"], wording)
+        if values.get("units"):
+            yield from wrong_units(values, self.PARAMETERS["units"], wording, self._gear_in(values))
 
     # ---- where drives come from --------------------------------------------------------------------------
 

@@ -147,13 +147,14 @@ class Inputs:
         >>> session.inputs.units.angle, session.inputs.machine_in_units.units
         ('deg', 'deg, rpm')
         """
-        return units_of(self.origin, self.machine.units)
+        return units_of(self.machine, self.origin).at_motor
 
     @cached_property
     def machine_in_units(self) -> Machine:
         """The machine that names these units, for what is computed and written elsewhere, as reports."""
-        same = units_of(self.machine) == self.units
-        return self.machine if same else with_typed_changes(self.machine, {"units": self.units.text})
+        units = units_of(self.machine, self.origin)
+        same = units_of(self.machine) == units
+        return self.machine if same else with_typed_changes(self.machine, {"units": units.text})
 
     @cached_property
     def soft_drive(self) -> Drive | None:

@@ -181,7 +181,9 @@ def document(report: Report) -> str:
         return Markup(re.sub(r">[^<]+<", lambda found: with_comma(found[0], comma), text))
 
     def scheme() -> Markup:
-        return in_page(plain.get_template("scheme.svg.j2").render(drive=drive, units=units_of(drive)))
+        return in_page(
+            plain.get_template("scheme.svg.j2").render(drive=drive, units=units_of(drive).at_motor)
+        )
 
     several, what = len(drive.shaft_names) > 1, drive.WHAT.removeprefix("a ")
     asked = several or drive.limits.fatigue is not None  # for lives
@@ -211,7 +213,7 @@ def document(report: Report) -> str:
         "geared": drive.gear is not None, "gear_in_words": gear_in_words(drive),
         "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
         "ends": starts.both_ends(report.comparison),
-        "plausibility_warnings": plausibility.plausibility_warnings(drive), "units": units_of(drive),
+        "plausibility_warnings": plausibility.plausibility_warnings(drive), "units": units_of(drive).at_motor,
         "most_torque": report.most_torque,
         "rated": rated_torque(drive.design_drive), "shown_until": traces.shown_until(report.ordered),
         "position": positions[0] if len(positions) == 1 else "unknown",
@@ -251,7 +253,7 @@ def limit_figure(report: Report) -> Figure:
 
 def maps_figure(report: Report) -> Figure:
     """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
-    drive, units = report.drive.design_drive, units_of(report.drive)
+    drive, units = report.drive.design_drive, units_of(report.drive).at_motor
     maps = {row.name: report.choice.maps[row.name] for row in report.choice.mapped}
     first = next(iter(maps.values()))
     gaps = [f"{units.shown(gap, 'rad'):.4g}" for gap in first.gaps]
@@ -327,7 +329,7 @@ def of_part(drive: Machine, path: str, parameter: Parameter) -> str:
 
 def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     """What is known of the drive and from where: heads and rows of the table, and what is absent."""
-    project, units, gear = report.project, units_of(report.drive), report.drive.gear
+    project, units, gear = report.project, units_of(report.drive).at_motor, report.drive.gear
     rows, absent = list[list[str]](), list[str]()
     for path, (parameter, value) in report.drive.parameters_by_path().items():
         if parameter.table in OWN_SECTION:

@@ -68,7 +68,7 @@ def asked_of(step: DutyStep, machine: Machine) -> str:
     >>> asked_of(DutyStep("jog", time="200 ms", repeat=3), Drive.load("crane-4amtkf"))
     'jog 0.2 s, 3 times'
     """
-    units, given = units_of(machine), step.given()
+    units, given = units_of(machine).at_motor, step.given()
     parts = []
     for key, si in ASKED.items():
         if key not in given:
@@ -119,7 +119,7 @@ def place_of(row: StepRun | None) -> str:
 
 def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
     """The columns of the table of steps."""
-    units = units_of(run.drive)
+    units = units_of(run.drive).at_motor
     shares = None if life is None else 100.0 * life.worst.shares
     return (
         DataColumn("step", lambda row: str(row.number)),
@@ -346,7 +346,7 @@ def idle_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
                 if angle < IDLE * speed * (step.time or one.time):
                     key = (name_of(one), run.controller_name)
                     idle[key] = min(angle, idle.get(key, math.inf))
-    units = units_of(runs[0].drive)
+    units = units_of(runs[0].drive).at_motor
     shown = (
         (place, f"{name} ({units.shown(angle, 'rad'):.3g} {units.of('rad')})")
         for (place, name), angle in idle.items()
@@ -508,7 +508,7 @@ def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math
 
 def draw_speeds(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
     """The speeds of all masses."""
-    units, names = units_of(run.drive), run.drive.mass_names
+    units, names = units_of(run.drive).at_motor, run.drive.mass_names
     t, traces = traces_between(run, begin, end)
     lines = [(name, line_of(i)) for i, name in enumerate(names)]
     if len(lines) == 2:

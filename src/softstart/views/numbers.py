@@ -256,17 +256,21 @@ def unit(written: str) -> str:
     return UNITS.get(written, written.replace("*", " "))
 
 
-def units_of(machine: Machine, named: str | None = None) -> Units:
-    """The units in which angles and speeds of a machine are seen: those that it names, else as it has them.
+def units_of(machine: Machine, given: Machine | None = None) -> Units:
+    """The units and the shaft in which a machine is seen: those that it names, else as it has its values.
 
-    `named`: instead of those that it names.
+    `given`: the machine of whose values these are, if it is another one.
 
     >>> from softstart import Drive
-    >>> units_of(Drive.load("hoist-15kw")), units_of(Drive.load("servo-axis-small")).angle
-    (Units(angle='deg', speed='rpm', diameter=0.0), ...)
+    >>> units_of(Drive.load("hoist-15kw")).text, units_of(Drive.load("servo-axis-small")).angle
+    ('deg, rpm', ...)
+    >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0, units="kN m, at output")
+    >>> units_of(crane).shown(50.0, "N*m")
+    1.9
     """
-    speeds = () if machine.target_speed is None else (float(machine.target_speed),)
-    return _read(machine.units if named is None else named, machine.local_gaps, speeds)
+    given = given or machine
+    speeds = () if given.target_speed is None else (float(given.target_speed),)
+    return _read(machine.units, given.local_gaps, speeds, machine.gear or machine.gear_with())
 
 
 _read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a frame

@@ -61,7 +61,7 @@ def over_time(run: Run, panels: Sequence[Callable[[Axes, Run], None]], title: st
         notes = "; ".join(filter(None, ["grey: gap open" if single else "", note]))
         axes[-1].set_xlabel(f"time, s     ({notes})" if notes else "time, s")
         axes[-1].set_xlim(0.0, run.end_time)
-        entitle(figure, title)
+        entitle(figure, f"{title}{units_of(run.drive).at}")
     return figure
 
 
@@ -72,9 +72,10 @@ def run_figure(run: Run) -> Figure:
 
 def torques(axes: Axes, run: Run) -> None:
     """Motor and shaft torques, and the permissible one."""
-    axes.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], label="motor torque u")
+    units = units_of(run.drive)
+    axes.plot(run.t, units.shown(run.u, "N*m"), color=COLOURS[1], ls=DASHES[1], label="motor torque u")
     shaft_torques(axes, run)
-    head(axes, f"K_dyn = {run.k_dyn:.3f}", "torque, N m")
+    head(axes, f"K_dyn = {run.k_dyn:.3f}", f"torque, {units.label('N*m')}")
 
 
 def shafts_of(run: Run | DutyRun) -> list[tuple[str, dict[str, Any]]]:
@@ -85,21 +86,24 @@ def shafts_of(run: Run | DutyRun) -> list[tuple[str, dict[str, Any]]]:
 
 def shaft_torques(axes: Axes, run: Run) -> None:
     """The torque of each shaft with its peak, the permissible one, and where K_dyn is 1."""
+    units, shafts = units_of(run.drive), run.trajectory.shafts
     for (name, line), torque, time, peak in zip(
-        shafts_of(run), run.T.reshape(run.t.size, -1).T, run.trajectory.shafts["peak_time"],
-        run.trajectory.shafts["peak"], strict=True,
+        shafts_of(run), units.shown(run.T.reshape(run.t.size, -1).T, "N*m"), shafts["peak_time"],
+        units.shown(shafts["peak"], "N*m"), strict=True,
     ):  # fmt: skip
         axes.plot(run.t, torque, label=name, **line)
         axes.plot([time], [peak], "o", ms=4, color=line["color"])
     if run.k_dyn > 0.0:
-        axes.axhline(run.peak_torque / run.k_dyn, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
+        mean = units.shown(run.peak_torque / run.k_dyn, "N*m")
+        axes.axhline(mean, color=GREY, lw=0.8, ls=":", label="K_dyn = 1")
     permissible_line(axes, run)
 
 
 def permissible_line(axes: Axes, run: Run) -> None:
     """The permissible shaft torque, if there is one."""
     if not math.isnan(run.permissible_torque):
-        axes.axhline(run.permissible_torque, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
+        most = units_of(run.drive).lossless.shown(run.permissible_torque, "N*m")
+        axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
 
 
 def speeds(axes: Axes, run: Run) -> None:
@@ -149,20 +153,23 @@ def shown_until(rows: Sequence[Row]) -> float:
 def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
     """Torques of several starts in small panels of one scale; grey where the gap is open."""
     runs, latest = [row.run for row in rows], shown_until(rows)
+    units = units_of(runs[0].drive)
     lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
     highest = max(float(max(run.peak_torque, run.u.max())) for run in runs)
     with drawing():
-        figure, axes = panels(len(rows), (2.0, 1.2), ACROSS, "time, s", "N m")
+        figure, axes = panels(len(rows), (2.0, 1.2), ACROSS, "time, s", f"{units.label('N*m')}{units.at}")
         for row, run, panel in zip(rows, runs, axes, strict=True):
             if len(run.drive.shaft_names) == 1:
                 shade_open_gap(panel, run, latest)
-            panel.plot(run.t, run.u, color=COLOURS[1], ls=DASHES[1], lw=0.9, label="motor torque u")
+            torque = units.shown(run.u, "N*m")
+            panel.plot(run.t, torque, color=COLOURS[1], ls=DASHES[1], lw=0.9, label="motor torque u")
             shaft_torques(panel, run)
             panel.set_title(f"{verbatim(row.name)}: {run.k_dyn:.3f}", loc="left", pad=3, fontsize=8.0)
             if not math.isnan(run.shown.limited_time):
                 panel.axvline(run.shown.limited_time, color=GREY, lw=0.8, ls=":")
         axes[0].set_xlim(0.0, latest)
-        axes[0].set_ylim(min(-0.06 * highest, 1.06 * lowest), 1.12 * highest)
+        ends = np.array([min(-0.06 * highest, 1.06 * lowest), 1.12 * highest])
+        axes[0].set_ylim(units.shown(ends, "N*m"))
         handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles[:FEW], labels[:FEW], loc="outside lower center", ncols=4)
         if title:
@@ -180,23 +187,20 @@ def before_after_figure(rows: Sequence[Row]) -> Figure:
     Of several shafts the torque of the one that is loaded most.
     """
     machine, runs = rows[0].run.drive, [row.run for row in rows]
-    units, latest = (
-        units_of(machine),
-        max(map(_shown_end, runs)),
-    )
+    units, latest = units_of(machine), max(map(_shown_end, runs))
     with drawing():
         figure, (torque, speed) = new_figure(1, 2, (8.0, 3.2), width_ratios=(1.7, 1.0))
         lines = ((COLOURS[1], 1.1), (COLOURS[0], 2.0))[-len(rows) :]
         for row, run, (colour, width) in zip(rows, runs, lines, strict=True):
             worst = run.T.reshape(run.t.size, -1)[:, run.worst_shaft]
-            torque.plot(run.t, worst, color=colour, lw=width, label=verbatim(row.name))
-            peak = float(run.trajectory.shafts["peak"][run.worst_shaft])
+            torque.plot(run.t, units.shown(worst, "N*m"), color=colour, lw=width, label=verbatim(row.name))
+            peak = units.shown(float(run.trajectory.shafts["peak"][run.worst_shaft]), "N*m")
             torque.plot([run.peak_time], [peak], "o", ms=4, color=colour)
             speed.plot(run.t, units.shown(run.w2, "rad/s"), color=colour, lw=width)
         permissible_line(torque, runs[0])
         torque.set_ylim(bottom=min(0.0, torque.get_ylim()[0]))  # so that "15 % less" looks like 15 %
-        head(torque, "", "shaft torque, N m", "time, s")
-        head(speed, "", f"load speed, {units.speed}", "time, s")
+        head(torque, "", f"shaft torque{units.at}, {units.label('N*m')}", "time, s")
+        head(speed, "", f"load speed{units.at}, {units.speed}", "time, s")
         for panel in (torque, speed):
             panel.set_xlim(0.0, 1.1 * latest)
         speed.axhline(units.shown(float(machine.target_speed), "rad/s"), color=GREY, lw=0.8, ls=":")

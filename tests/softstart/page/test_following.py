@@ -248,7 +248,7 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     controls.take({"what": "edit", "path": gap, "text": "0.3"})
     assert session.inputs.machine.parameters_by_path()[gap][1] == 0.0075
     controls.take({"what": "edit", "path": "units", "text": "cubits"})
-    assert 'write for example "deg, rpm"' in frames.mistakes["units"]
+    assert 'write for example "deg, rpm, kN m, at output"' in frames.mistakes["units"]
 
 
 class Reader:
