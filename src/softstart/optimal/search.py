@@ -16,7 +16,7 @@ from softstart.optimal.problem import Objective, Problem
 from softstart.optimal.starts import DemandRun, DemandSimulator, steady_shaft_torques, wanted
 from softstart.profile import TorqueProfile
 
-KNOTS, MOST_KNOTS = 8, 160  # even ones, in the mean of slowest and fastest period, and in all
+KNOTS, MOST_KNOTS = 10, 160  # even ones, in the mean of slowest and fastest period, and in all
 APART = 0.4  # of their distance, which they keep from knots that are known, so that these do not add up
 INSTANTS = 32  # of the fastest period, at which torques are limited
 PENALTY = 200.0  # of what is missed, as shares, beside the objective as a share
