@@ -54,6 +54,8 @@ from softstart.optimal.result import OptimumError as OptimumError
 from softstart.profile import TorqueProfile as TorqueProfile
 from softstart.reporting.result import Report as Report
 from softstart.reporting.result import report as report
+from softstart.reporting.sheet import ParameterSheet as ParameterSheet
+from softstart.reporting.sheet import parameter_sheet as parameter_sheet
 from softstart.start.block import control_block as control_block
 from softstart.start.comparison import Comparison as Comparison
 from softstart.start.comparison import compare as compare

@@ -39,6 +39,7 @@ COMMANDS = {
     "sweep": "sweep {} --controller shaped --axis shaft.gap=1x:2x:2",
     "reduce": "reduce {}",
     "report": "report {} --out report.html",
+    "sheet": "sheet {} --controller s-curve",
 }
 # command and machine, or its class: a word of the sentence
 REFUSED = {("fatigue", one): "damping" for one in ("undamped", "crane-4-mass")}

@@ -54,6 +54,7 @@ QUICK = {
     "clutch": "clutch",
     "balance": "balance",
     "report": "report --json --budget 0 --controllers direct,ramp",
+    "sheet": f"sheet {CRANE} --controller ramp",
     "serve": "serve nowhere.toml --no-browser",
     "init": "init --set load.machine=rotor --set motor.rated_speed=1430rpm --set load.inertia=1",
     "identify": f"identify nowhere.csv --drive {CRANE}",

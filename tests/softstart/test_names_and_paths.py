@@ -54,7 +54,7 @@ def test_name_path_and_object_are_the_same(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", [*TAKES, "optimize", "tune", "sweep", "report", "identify", "plan_experiments"]
+    "name", [*TAKES, "optimize", "tune", "sweep", "report", "parameter_sheet", "identify", "plan_experiments"]
 )
 def test_anything_else_is_refused_in_one_sentence(name: str) -> None:
     more: dict[str, Callable[[Any], Any]] = {
@@ -62,6 +62,7 @@ def test_anything_else_is_refused_in_one_sentence(name: str) -> None:
         "tune": lambda one: softstart.tune(one, "ramp"),
         "sweep": lambda one: softstart.sweep(one, "ramp", {"gap": [0.5, 1.0]}),
         "report": softstart.report,
+        "parameter_sheet": lambda one: softstart.parameter_sheet(one, "ramp"),
         "identify": lambda one: softstart.identify([], one),
         "plan_experiments": softstart.plan_experiments,
     }

@@ -1,4 +1,4 @@
-"""`softstart report`: one HTML file for a customer."""
+"""`softstart report`: one HTML file for a customer; `softstart sheet`: the parameters of a strategy."""
 
 from __future__ import annotations
 
@@ -95,6 +95,44 @@ def report_command(
             write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
     sheet, written = report.sheet, " and ".join(filter(None, (to, pdf)))
     return report.summary, replace(sheet, notes=[*sheet.notes, f"Written to {written}."])
+
+
+@command("sheet")
+@options.controller_option("--controller", required=True)
+@options.param_option
+@option("--resolution")
+@options.of_drive(options.read_machine_or_identified)
+@answers()
+def sheet_command(
+    *, drive: Machine | Identification, controller: str, params: dict[str, str], resolution: str | None
+) -> Output:
+    """Show the parameter sheet of a strategy: what to set on the inverter.
+
+    DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain, or the folder of an
+    identification; by default the crane drive of the literature. Parameters are rounded to what an inverter
+    takes and stated in its units; the start is simulated again with exactly the values shown, and half a step
+    off. Of a file of tuned gains it shows every cell of the set. Where the drive has limits that the strategy
+    does not keep, its parameters are set for them first, as in compare.
+
+    Options
+    -------
+    --controller NAME
+        A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).
+    --param KEY=VALUE
+        Set a parameter of the strategy, for example time='200 ms'. May be repeated.
+    --resolution KEY=STEP,...
+        Resolution of the inverter parameters, for example
+        torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,share=1%. Torque in % of the rated torque or in
+        N*m. Default: 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.
+    """
+    with working("starting the drive ..."), attributed():
+        from softstart.reporting.sheet import parameter_sheet
+
+        (strategy,) = controllers_from_options([controller], params, several=False)
+        found = parameter_sheet(drive, strategy, resolution=resolution)
+    program = found.export_command(options.typed_machine(), controller) if found.is_code else ""
+    commands = [(program, "the program with these values (--as c: C)")] if program else []
+    return found.summary, replace(found.sheet, commands=commands)
 
 
 def _check_file(option: str, out: str) -> None:

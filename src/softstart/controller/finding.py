@@ -145,7 +145,8 @@ def _tuned(path: Path, parameters: Mapping[str, object] | None, allow_code: bool
         )
     try:
         if isinstance(saved, RobustFile):
-            return RobustGains(path.stem, make_controller(saved.controller, saved.parameters), saved.drive)
+            made = make_controller(saved.controller, saved.parameters)
+            return RobustGains(path.stem, made, saved.drive, saved.gaps, saved.load_inertias)
         return scheduled(saved, path.stem, make_controller(saved.controller, saved.fixed))
     except InputError as error:
         raise InputError([f'controller = "{path}": {sentence}' for sentence in error.sentences]) from None

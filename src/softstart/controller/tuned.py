@@ -47,11 +47,16 @@ class Gain(NamedTuple):
 
 
 class RobustFile(NamedTuple):
-    """A robust set: a controller, its parameters, and the drive they are fitted to."""
+    """A robust set: a controller, its parameters, the drive they are fitted to, and the cells it is for.
+
+    The cells are all pairs of `gaps` (rad) and `load_inertias` (kg m2); none in a file that does not say so.
+    """
 
     controller: str
     parameters: dict[str, object]
     drive: Drive
+    gaps: tuple[float, ...] = ()
+    load_inertias: tuple[float, ...] = ()
 
 
 class ScheduleFile(NamedTuple):
@@ -98,6 +103,8 @@ class Tuned(Controller):
 class RobustGains(Tuned):
     """One set of gains for all: the controller as it was set up for the nominal drive, whatever drive starts.
 
+    `gaps` (rad) and `load_inertias` (kg m2) are those that it was tuned for, where that is known.
+
     >>> from softstart import simulate
     >>> from softstart.controller import make_controller
     >>> crane = Drive.load("crane-4amtkf")
@@ -109,6 +116,8 @@ class RobustGains(Tuned):
     """
 
     nominal: Drive
+    gaps: tuple[float, ...] = ()
+    load_inertias: tuple[float, ...] = ()
 
     def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
         """The controller set up for the nominal drive, and that drive."""
@@ -295,7 +304,9 @@ def _read_robust(document: Mapping[str, object], path: Path) -> RobustFile:
     parameters = _section(document, "parameters", path)
     tables = _section(document, "drive", path)
     drive = Drive.from_tables(tables, where=f'controller = "{path}", [drive]')
-    return RobustFile(name, dict(parameters), drive)
+    about = _section(document, "about", path, needed=False)
+    cells = (_axis(about[key], key, path) if key in about else () for key in ("gaps", "load_inertias"))
+    return RobustFile(name, dict(parameters), drive, *cells)
 
 
 def _read_schedule(document: Mapping[str, object], path: Path) -> ScheduleFile:
@@ -379,9 +390,9 @@ def robust_text(
     meanings: Mapping[str, str] | None = None,
     derived: Mapping[str, object] | None = None,
 ) -> str:
-    """The TOML text of a robust set; `about` says where it comes from and is not read, nor are `meanings`.
+    """The TOML text of a robust set; of `about`, which says where it comes from, only the cells are read.
 
-    Nor is `derived`, what it takes from its drive (`derived_from_nominal`).
+    Not read are `meanings`, nor `derived`, what it takes from its drive (`derived_from_nominal`).
 
     >>> from pathlib import Path
     >>> saved = RobustFile("ramp", {"time": 0.12}, Drive.load("crane-4amtkf"))

@@ -94,7 +94,7 @@ def design_for(controller: Controller, drive: MachineLike, period: float | None 
             "it from CompiledController and compile its step with compiled_step."
         )
     settings = rounded_settings(ready, machine.design_drive)
-    values: dict[str, Any] = {one.name: one.rounded for one in settings if one.step is not None}
+    values: dict[str, Any] = {one.name: one.rounded for one in settings if one.rounded != one.exact}
     set_to = replace(ready, **values)
     rounded = RobustGains("export", set_to, own)
     block = ControlBlock(rounded, block_drive(machine), period)

@@ -18,7 +18,7 @@ from softstart.drive import Drive
 from softstart.results import OneLine
 from softstart.start.batch import prepared
 from softstart.start.comparison import REFERENCE, Comparison
-from softstart.start.recommendation import Recommendation, Row
+from softstart.start.recommendation import Recommendation, Row, keeps
 from softstart.start.results import limited_time
 
 GAPS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the drive's own
@@ -107,10 +107,17 @@ class Choice(OneLine):
         return min(rows, key=self.worst, default=None)
 
     @property
-    def of_sheets(self) -> list[Row]:
+    def foremost(self) -> list[Row]:
         """The chosen strategy, and those of an ordinary inverter and of one with speed control, each once."""
         rows = (self.chosen, self.ordinary, self.speed_controlled)
         return list(dict.fromkeys(row for row in rows if row is not None))
+
+    @property
+    def of_sheets(self) -> list[Row]:
+        """Those with a parameter sheet: the foremost, and all others that keep the limits."""
+        limits = self.recommendation.limits
+        keeping = [row for row in self.comparison.rows if limits and keeps(row, limits)]
+        return list(dict.fromkeys([*self.foremost, *keeping]))
 
     @property
     def role(self) -> str:
@@ -135,7 +142,7 @@ class Choice(OneLine):
     def mapped(self) -> list[Row]:
         """Those whose maps are shown: the two chosen, direct, and others with the lowest worst case."""
         others = sorted(self._able, key=lambda row: np.nan_to_num(self.worst(row), nan=math.inf))
-        shown = dict.fromkeys([*self.of_sheets, self.direct, *others])
+        shown = dict.fromkeys([*self.foremost, self.direct, *others])
         return [row for row in shown if row.name in self.maps][:MOST_MAPS]
 
     @property

@@ -18,12 +18,12 @@ from matplotlib.patches import Rectangle
 from softstart.drive import Drive, Machine, plausibility
 from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
-from softstart.reporting import choice, limit
-from softstart.reporting.inverters import at_inverters, inverters, speed_values
+from softstart.reporting import choice, limit, sheet_view
+from softstart.reporting.inverters import inverters
 from softstart.start import fatigue
 from softstart.start.comparison import Comparison
 from softstart.start.recommendation import SLOW
-from softstart.start.resolution import gain_base, rated_torque
+from softstart.start.resolution import rated_torque
 from softstart.vibration import natural_vibration
 from softstart.views import chains, drives, duties, starts, traces
 from softstart.views import fatigue as lives
@@ -219,8 +219,7 @@ def document(report: Report) -> str:
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
         "drive_file": re.sub(r" *#[^\"\n]*$", "", report.provenance["drive"], flags=re.MULTILINE),
-        "inverters": inverters(), "at_inverters": at_inverters, "gain_base": gain_base,
-        "speed_values": speed_values,
+        "inverters": inverters(), "sheet_view": sheet_view,
         "table": partial(table, comma), "view": partial(view, comma),
         "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
@@ -244,7 +243,7 @@ def limit_figure(report: Report) -> Figure:
     curve = report.limit
     return traces.trade_off_figure(
         [(row.name, row.run.start_time, row.run.k_dyn) for row in rows],
-        filled=[index for index, row in enumerate(rows) if row in report.choice.of_sheets],
+        filled=[index for index, row in enumerate(rows) if row in report.choice.foremost],
         optima=[(p.start_time_bound, p.k_dyn) for p in curve.found if p.k_dyn is not None],
         best=f"{best_start(report.drive)} found",
         bound=list(zip(curve.times, curve.bounds, strict=True)),

@@ -92,9 +92,9 @@ class Report(Result):
         A bound that no start can go below, and the optima found.
     choice : Choice
         The strategies that could be started, the recommendation, and the best one of an ordinary inverter.
-    sheets : tuple of Sheet
-        Parameter sheets: of the recommended strategy (without limits: that with the lowest K_dyn), then
-        of the best one of an ordinary inverter, if these are two.
+    sheets : tuple of ParameterSheet
+        Of the recommended strategy (without limits: that with the lowest K_dyn), of the best ones of an
+        ordinary inverter and of one with speed control, and of all others that keep the limits.
     resolution : Resolution
         The steps in which the inverter can be set.
     provenance : dict
@@ -185,13 +185,13 @@ class Report(Result):
 
     @cached_property
     def duties(self) -> DutyComparison | str:
-        """The duty of the machine under `direct` and the strategies with a sheet, or why there is none.
+        """The duty of the machine under `direct` and the foremost strategies, or why there is none.
 
         Empty for a machine without a duty.
         """
         if self.drive.duty is None:
             return ""
-        rows = dict.fromkeys([self.choice.direct, *self.choice.of_sheets])
+        rows = dict.fromkeys([self.choice.direct, *self.choice.foremost])
         try:
             return compare_duty(self.drive, [row.controller for row in rows])
         except (InputError, SimulationError) as error:
@@ -391,7 +391,7 @@ def report(
 
     curve = limit(
         machine,
-        [row.run.start_time for row in choice.of_sheets if not math.isnan(row.run.start_time)],
+        [row.run.start_time for row in choice.foremost if not math.isnan(row.run.start_time)],
         [row.run.start_time for row in comparison.rows if not math.isnan(row.run.start_time)],
         choice.direct.run.start_time,
         budget,

@@ -10,19 +10,25 @@ from softstart.controller.base import Controller
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
 from softstart.start.resolution import Resolution, gain_base, nearest_step, rated_torque
-from softstart.views.numbers import RPM, decimals_of, digits, fixed, short, unit
+from softstart.start.setting import rounded as rounded_down
+from softstart.views.numbers import RPM, column_of, decimals_of, number, short, unit
 
 OFF_AT_0 = ("preload", "filter_time")  # 0 is none of it, not a value that may be half a step off
 GAIN = "N*m*s/rad"  # of a speed controller
 KEPT = ("period",)  # the cycle of the control code is what the inverter has, no setting
 EVEN = 1e-9  # of a step: what lies above a multiple by no more than this is that multiple
 COARSE = 0.1  # a step above this share of the value is said to be coarse
+TOLD_APART = 6  # decimals of the steps of which every multiple is printed exactly
 DEFAULT = Resolution()
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One value of a strategy in SI: exact, and rounded to `step` (None: taken as it is)."""
+    """One value of a strategy in SI: exact, and rounded to `step`; without a step to four digits.
+
+    What `shown` prints is the rounded value itself, so that a start with the printed values is that of the
+    sheet. The cycle of a program is rounded to three digits, and never up.
+    """
 
     name: str
     meaning: str
@@ -53,29 +59,43 @@ class Setting:
         """As plain data."""
         return {key: getattr(self, key) for key in ("name", "unit", "exact", "rounded", "step")}
 
+    def unit_at_inverter(self, drive: Drive) -> tuple[float, str]:
+        """The unit in which the value is set, and what it is of that in SI.
+
+        Torques and gains are in per cent where their steps are, else as they are.
+        """
+        if self.unit == "s":
+            return 1e-3, "ms"
+        if self.unit == "rad/s":
+            return (2.0 * math.pi, "Hz") if "frequency" in self.name else (1.0 / RPM, "rpm")
+        (rated, basis), gain = rated_torque(drive), gain_base(drive)[0]
+        in_percent = {"N*m": (0.01 * rated, f"% of the {basis}"), GAIN: (gain, "% of torque per % of speed")}
+        share, name = in_percent.get(self.unit, (1.0, ""))
+        if name and (self.step is None or is_short(self.step / share)):
+            return share, name
+        return 1.0, unit(self.unit)
+
     def shown(self, drive: Drive) -> tuple[str, str, str, str]:
-        """What to set, its unit, the same in another one, and the exact value."""
+        """What to set, its unit, the same in another one, and the exact value; all in ASCII."""
         if isinstance(self.exact, str) or isinstance(self.rounded, str):
             return str(self.rounded), "", "", str(self.exact)
-        factor, name, other = 1.0, unit(self.unit), ""
-        if self.unit == "s":
-            factor, name = 1e3, "ms"
-        elif self.unit == "rad/s":
-            factor, name = (0.5 / math.pi, "Hz") if "frequency" in self.name else (RPM, "rpm")
-            other = f"{digits(self.rounded)} rad/s"
-        elif self.unit == "N*m":
-            rated, basis = rated_torque(drive)
-            percent = step_multiple(100.0 * self.rounded / rated, self.step and 100.0 * self.step / rated)
-            other = f"{percent} % of the {basis}"
-        elif self.unit == GAIN:
-            other = f"{digits(self.rounded / gain_base(drive)[0])} % of torque per % of speed"
-        value, exact = factor * self.rounded, short(float(f"{factor * self.exact:.5g}"))
+        share, name = self.unit_at_inverter(drive)
+        value, exact = self.rounded / share, short(float(f"{self.exact / share:.5g}"))
         if self.name in KEPT:
-            digit = 10.0 ** (math.floor(math.log10(value)) - 2) if value > 0.0 else 1.0
-            most = math.floor(value / digit * (1.0 + EVEN)) * digit  # not longer than it may be
-            return f"≤ {short(float(f'{most:.3g}'))}", name, "", exact
-        text = short(float(f"{value:.4g}")) if self.step is None else step_multiple(value, factor * self.step)
+            return short(value), name, "or less", exact
+        text = short(value) if self.step is None else step_multiple(value, self.step / share)
+        other = "" if name in (unit(self.unit), "ms") else f"{column_of([self.rounded])[0]} {unit(self.unit)}"
         return text, name, other, exact
+
+
+def is_short(step: float) -> bool:
+    """Whether a step is a short decimal, so that its multiples can be printed exactly.
+
+    >>> is_short(0.1), is_short(0.0238732)
+    (True, False)
+    """
+    step = float(f"{step:.9g}")
+    return decimals_of(step) <= TOLD_APART and step == float(f"{step:.4g}")
 
 
 def step_multiple(value: float, step: float | None) -> str:
@@ -86,13 +106,12 @@ def step_multiple(value: float, step: float | None) -> str:
     """
     if not step:
         return short(value)
-    step = float(f"{step:.9g}")
-    if decimals_of(step) <= 6 and step == float(f"{step:.4g}"):
-        return fixed(value, decimals_of(step))
+    if is_short(step):
+        return number(value, decimals_of(float(f"{step:.9g}")))
     order = math.floor(math.log10(abs(value))) if value else 0
     if not -4 <= order <= 6:
-        return digits(value, 7)
-    return fixed(value, min(max(math.ceil(-math.log10(step)), 3 - order, 0), max(6 - order, 0)))
+        return column_of([value], 7)[0]
+    return number(value, min(max(math.ceil(-math.log10(step)), 3 - order, 0), max(6 - order, 0)))
 
 
 def rounded_settings(
@@ -114,18 +133,19 @@ def rounded_settings(
         if not isinstance(value, int | float) or isinstance(value, bool):
             found.append(Setting(name, meaning, unit, str(value), str(value), None))
             continue
-        number = float(value)
+        exact = float(value)
         step = None if name in KEPT else resolution.step(name, unit, rated)
         if unit == GAIN:  # in shares of per cent of torque per per cent of speed
             step = resolution.share * gain_base(drive)[0]
-        if name in OFF_AT_0 and number == 0.0:
+        if name in OFF_AT_0 and exact == 0.0:
             step = None
-        if step is None or not math.isfinite(number):
-            found.append(Setting(name, meaning, unit, number, number, None))
+        least, most = declared.between or (-math.inf if exact < 0.0 else 0.0, math.inf)
+        if step is None or not math.isfinite(exact):
+            told = rounded_down(exact) if name in KEPT else min(max(float(f"{exact:.4g}"), least), most)
+            found.append(Setting(name, meaning, unit, exact, told, None))
             continue
-        least, most = declared.between or (-math.inf if number < 0.0 else 0.0, math.inf)
         most = float(drive.maximum_torque) if unit == "N*m" else float(most)
-        rounded = nearest_step(number, step, max(most, 0.0))
+        rounded = nearest_step(exact, step, max(most, 0.0))
         least = min(float(least), rounded)
-        found.append(Setting(name, meaning, unit, number, rounded, step, least, most))
+        found.append(Setting(name, meaning, unit, exact, rounded, step, least, most))
     return tuple(found)

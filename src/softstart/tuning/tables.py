@@ -52,7 +52,8 @@ def robust_outcome(trials: Trials, search: GainSearch) -> RobustSet:
     ready, nominal = replace(trials.controller, **values).set_up(trials.drives[0])
     if len(trials.problem.drive.positions) > 1:  # controllers are set up for mid-gap; the drive has no such
         nominal = nominal.replace(start_position="unknown")
-    names, tuned = trials.problem.names, RobustGains("robust", ready, nominal)
+    problem = trials.problem
+    names, tuned = problem.names, RobustGains("robust", ready, nominal, problem.gaps, problem.load_inertias)
     given = replace(trials.controller, **{name: values[name] for name in names})
     cells = [trials.problem.drive_of(cell).design_drive for cell in range(len(trials.problem.cells))]
     ends = None

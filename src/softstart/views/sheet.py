@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import html
+import io
 import math
 import platform
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from softstart import __version__
 from softstart.drive import Machine
@@ -100,9 +101,16 @@ class Sheet:
 # terminal --------------------------------------------------------------------------------------------------
 
 
-def print_sheet(sheet: Sheet) -> None:
-    """Print a sheet."""
-    to = console()
+def sheet_text(sheet: Sheet) -> str:
+    """What is printed of a sheet in a pipe."""
+    stream = io.StringIO()
+    print_sheet(sheet, stream)
+    return stream.getvalue()
+
+
+def print_sheet(sheet: Sheet, stream: TextIO | None = None) -> None:
+    """Print a sheet, or write it into a stream of text."""
+    to = console(stream)
     print_lines(to, sheet.lines)
     if sheet.status or sheet.facts:
         to.print()

@@ -6,7 +6,7 @@ import json
 import sys
 from collections.abc import Sequence
 from textwrap import wrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from softstart.views.numbers import Column, TextTable, json_ready, printable
 
@@ -17,8 +17,8 @@ NARROWEST, IN_A_PIPE = 80, 100
 GUTTER, LONGEST_NAME, SHORTEST_TEXT = 2, 28, 12
 
 
-def console() -> Console:
-    """Standard output. Square brackets are text here, not markup: sources are called [G]."""
+def console(stream: TextIO | None = None) -> Console:
+    """Standard output, or a text. Square brackets are text here, not markup: sources are called [G]."""
     from rich.console import Console
 
     class Pipe(Console):
@@ -27,8 +27,8 @@ def console() -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    made = Pipe(file=sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=False)
-    known = made.is_terminal or "COLUMNS" in made._environ
+    made = Pipe(file=stream or sys.stdout, highlight=False, markup=False, emoji=False, soft_wrap=False)
+    known = stream is None and (made.is_terminal or "COLUMNS" in made._environ)
     made.width = max(NARROWEST, made.width) if known else IN_A_PIPE
     return made
 
@@ -121,7 +121,7 @@ def _print_block(to: Console, shown: TextTable, headings: bool) -> None:
             to.print(table, crop=False)
     finally:
         to.width = before
-    print("\n".join(line.rstrip() for line in captured.get().rstrip().splitlines()))
+    print("\n".join(line.rstrip() for line in captured.get().rstrip().splitlines()), file=to.file)
 
 
 def sentence(to: Console, text: str, style: str = "") -> None:

@@ -3,18 +3,24 @@
 import itertools
 import math
 import re
+import shlex
 from fractions import Fraction
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from softstart import Drive, InputError, compare, simulate
+from softstart import Drive, InputError, compare, parameter_sheet, simulate, tune
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
+from softstart.export.design import design_for
+from softstart.plugins import controller_names
 from softstart.reporting import Resolution, report
 from softstart.reporting.sheet import make_sheet
+from softstart.reporting.sheet_view import settings
 from softstart.start.resolution import nearest_step, rated_torque
+
+HOIST = Drive.load("hoist-15kw")
 
 
 def sheet_of(name, steps, **parameters):
@@ -188,3 +194,83 @@ def test_the_worst_case_counts_the_rounded_values_themselves():
     sheet = make_sheet(servo, shaped, simulate(servo, shaped), Resolution())
     assert sheet.worst_k_dyn >= sheet.rounded.k_dyn
     assert sheet.slowest >= sheet.rounded.start_time
+
+
+def printed_values(sheet):
+    """The values of a sheet as its text says them, in SI, and its K_dyn."""
+    drive, text = sheet.drive, str(sheet)
+    rated = (15e3 if drive.name == HOIST.name else 2200.0) / drive.rated_speed
+    units = {
+        "ms": 1e-3, "rpm": math.pi / 30.0, "Hz": 2.0 * math.pi, "": 1.0,
+        "% of the rated torque": 0.01 * rated, "% of torque per % of speed": rated / drive.rated_speed,
+    }  # fmt: skip
+    values = {}
+    for name, shown, unit, *_ in settings(sheet).rows:
+        assert re.search(rf"^{name} +{re.escape(shown)}\b", text, re.MULTILINE)
+        word = shown in ("peak", "zv")
+        values[name.replace(" ", "_")] = shown if word else float(shown) * units[unit]
+    k_dyn, time = re.search(r"^values of the sheet +([\d.]+) +[\d.]+ +([\d.]+)$", text, re.MULTILINE).groups()
+    return values, k_dyn, time
+
+
+STRATEGIES = [name for name in controller_names() if name != "profile"]
+
+
+@pytest.mark.parametrize("name", STRATEGIES)
+@pytest.mark.parametrize("drive", [Drive.load("crane-4amtkf"), HOIST], ids=["crane", "hoist"])
+def test_the_k_dyn_of_a_sheet_is_that_of_a_start_with_exactly_the_printed_values(drive, name):
+    sheet = parameter_sheet(drive, name)
+    values, k_dyn, time = printed_values(sheet)
+    run = simulate(drive, name, parameters=values)
+    assert (f"{run.k_dyn:.4f}", f"{run.limited_time:.5f}") == (k_dyn, time)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "steps"),
+    [("take-up", {"rise": "33 ms"}, {}), ("shaped", {}, {"time": "10 ms", "torque": "2%"})],
+)
+def test_the_program_that_a_sheet_names_has_its_values(name, given, steps):
+    crane = Drive.load("crane-4amtkf")
+    sheet = parameter_sheet(crane, name, parameters=given, resolution=steps)
+    words = shlex.split(sheet.export_command("crane-4amtkf"))
+    assert words[:5] == ["softstart", "export", "crane-4amtkf", "--controller", name]
+    parameters = dict(word.split("=") for flag, word in itertools.pairwise(words) if flag == "--param")
+    program = design_for(make_controller(name, parameters), crane)
+    assert program.controller.controller.parameters == sheet.rounded.controller.parameters
+
+
+def test_the_sheet_of_a_tuned_set_has_all_its_cells(tmp_path):
+    crane, path = Drive.load("crane-4amtkf"), tmp_path / "robust.toml"
+    tuned = tune(crane, "reduced-first-stage", ["1x", "4x"], ["1x"], free=["torque"], certified=False,
+                 generations=2, restarts=1)  # fmt: skip
+    tuned.to_toml(path, "robust")
+    sheet = parameter_sheet(crane, str(path), resolution="torque=4%")
+    exact = tuned.robust.cells["k_dyn"].to_numpy().ravel().tolist()
+    assert [cell.exact.k_dyn for cell in sheet.cells] == pytest.approx(exact, rel=1e-12)
+    values, *_ = printed_values(sheet)
+    text = str(sheet)
+    for cell in sheet.cells:
+        there = crane.replace(gap=cell.gap, load_inertia=cell.load_inertia)
+        run = simulate(there, "reduced-first-stage", parameters=values, fitted_to=crane)
+        assert re.search(
+            rf"^{cell.gap:.3f} +0.1750 +{cell.exact.k_dyn:.4f} +{run.k_dyn:.4f} ", text, re.MULTILINE
+        )
+        assert run.k_dyn != cell.exact.k_dyn
+    worst = max(cell.rounded.k_dyn for cell in sheet.cells)
+    assert f"In the worst of the 2 cells that they were tuned for: K_dyn {worst:.4f}," in text.replace(
+        "\n", " "
+    )
+    assert sheet.export_command("x", str(path)) == ""  # which rounds to other steps
+    usual = parameter_sheet(crane, str(path)).export_command("x")
+    assert usual == "softstart export x --controller robust.toml --as st --out reduced-first-stage-st"
+
+
+def test_a_sheet_is_set_for_the_limits_as_in_compare_and_says_their_margins():
+    drive = Drive.load("crane-4amtkf").replace(permissible_torque=170.0, permissible_start_time=0.6)
+    (row,) = compare(drive, ["s-curve"]).rows
+    sheet = parameter_sheet(drive, "s-curve")
+    assert row.setting
+    assert {one.name: one.exact for one in sheet.settings}.items() >= row.setting.items()
+    (torque, time) = sheet.margins
+    assert torque.kept
+    assert f"With these values: {torque}; {time}." in str(sheet).replace("\n", " ")

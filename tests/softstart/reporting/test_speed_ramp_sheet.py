@@ -45,7 +45,7 @@ def test_kp_is_rounded_in_per_cent_per_per_cent_and_started_again():
     kp = next(one for one in sheet.settings if one.name == "kp")
     base = gain_base(CRANE)[0]
     assert kp.rounded / (0.05 * base) == pytest.approx(round(kp.rounded / (0.05 * base)), abs=1e-9)
-    assert kp.shown(CRANE)[2].endswith("% of torque per % of speed")
+    assert kp.shown(CRANE)[1:3] == ("% of torque per % of speed", "5.220 N m s/rad")
     again = simulate(CRANE, "speed-ramp", parameters=sheet.values)
     assert sheet.rounded.settled_time == again.settled_time
     assert sheet.loop.startswith("Speed loop with the gap closed: phase margin ")

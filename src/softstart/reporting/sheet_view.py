@@ -1,0 +1,223 @@
+"""What is shown of a parameter sheet, the same in a report, on a terminal and as a text to be copied."""
+
+from __future__ import annotations
+
+import math
+
+from softstart.controller.tuned import GainSchedule
+from softstart.errors import listed
+from softstart.reporting.inverters import at_inverters, inverters, speed_values
+from softstart.reporting.sheet import ParameterSheet
+from softstart.start.resolution import RATED, gain_base, rated_torque
+from softstart.views.numbers import (
+    Column,
+    TextTable,
+    at_output,
+    column_of,
+    number,
+    plural,
+    short,
+    units_of,
+)
+from softstart.views.sheet import Sheet
+from softstart.views.starts import machine_lines
+
+
+def shown_sheet(sheet: ParameterSheet) -> Sheet:
+    """The whole sheet.
+
+    >>> from softstart import parameter_sheet
+    >>> shown_sheet(parameter_sheet("crane-4amtkf", "direct")).conclusions
+    ['With these values: K_dyn 3.1178, start time 0.37352 s; with the exact ones 3.1179 and 0.37351 s.']
+    """
+    title = f"Parameter sheet: {sheet.name}"
+    lines = [title, *machine_lines(sheet.drive)[1:]]
+    lines.insert(1, f"  for    {sheet.drive.name}")
+    tables = [settings(sheet), at_each_inverter(sheet), starts(sheet), cells(sheet)]
+    return Sheet(title, lines, tables=tables, conclusions=[outcome(sheet)], notes=notes(sheet, code=True))
+
+
+def settings(sheet: ParameterSheet) -> TextTable:
+    """The values; no rows where they could not be rounded."""
+    what, rows, drive = inverters()["setting"], list[list[str]](), sheet.drive.design_drive
+    for one in sheet.settings if sheet.rounded else ():
+        rows.append([one.name.replace("_", " "), *one.shown(drive), what.get(one.name, one.meaning)])
+    heads = [("parameter", False), ("set to", True), ("unit", False), ("that is", True), ("exact", True)]
+    columns = [Column(*one) for one in (*heads, ("what it is at the inverter", False))]
+    return TextTable("", columns, rows, keys=1)
+
+
+def at_each_inverter(sheet: ParameterSheet) -> TextTable:
+    """A speed ramp in the functions of inverters; no rows for other strategies."""
+    drive, rows = sheet.drive.design_drive, list[list[str]]()
+    if sheet.kind == "speed-ramp" and sheet.rounded:
+        at, (basis, speed) = speed_values(sheet.values, drive), (rated_torque(drive)[1], gain_base(drive)[1])
+        in_units = (
+            f"ramp time {at['ramp_s']} s ({at['rate']} rpm/s, to {at['target_rpm']} rpm), rounding "
+            f"{at['rounding_s']} s at each end, Kp {at['kp']} N m s/rad, Tn {at['tn_ms']} ms, torque limit "
+            f"{at['limit_percent']} % of the {basis}"
+        )
+        percent = f"{at['kp_percent']} (100 %: {basis}, {speed})"
+        rows = [
+            ["units of this sheet", in_units],
+            ["Kp in per cent of torque per per cent of speed", percent],
+            *map(list, at_inverters(sheet.values, drive)),
+        ]
+    return TextTable(
+        f"{sheet.name} at inverters", [Column("inverter", False), Column("settings", False)], rows
+    )
+
+
+def starts(sheet: ParameterSheet) -> TextTable:
+    """The start with exact values, with those of the sheet, and with values half a step off."""
+    exact, rounded = sheet.exact, sheet.rounded
+    if rounded is None:
+        return TextTable("", [], [])
+    found = [
+        ("exact values", exact.k_dyn, exact.peak_torque, exact.limited_time),
+        ("values of the sheet", rounded.k_dyn, rounded.peak_torque, rounded.limited_time),
+    ]
+    if sheet.variants:
+        found.append(
+            ("worst with values half a step off", sheet.worst_k_dyn, sheet.worst_peak, sheet.slowest)
+        )
+    units, peaks = units_of(sheet.drive), [peak for _, _, peak, _ in found]
+    columns = {
+        "start with": [name for name, *_ in found],
+        "K_dyn": [number(k_dyn, 4) for _, k_dyn, *_ in found],
+        f"peak torque{units.at}\n{units.label('N*m')}": column_of([units.shown(p, "N*m") for p in peaks]),
+    }
+    if sheet.drive.gear and not units.gear:
+        columns["at the output\nN m"] = [at_output(sheet.drive, peak) for peak in peaks]
+    columns[f"{exact.limited_name}\ns"] = column_of([time for *_, time in found], 5)
+    return TextTable.of(f"{sheet.name}: started again after rounding", columns, ["start with"])
+
+
+def cells(sheet: ParameterSheet) -> TextTable:
+    """Exact values and those of the sheet in each cell of a tuned set."""
+    units, found = units_of(sheet.drive), [cell.summary() for cell in sheet.cells]
+    gaps = [units.shown(one["gap"], "rad") for one in found]
+    inertias = [units.shown(one["load_inertia"], "kg*m^2") for one in found]
+    return TextTable.of(
+        f"{sheet.name}: all cells that it was tuned for",
+        {
+            f"gap{units.at}\n{units.angle}": column_of(gaps),
+            f"load inertia{units.at}\nkg m2": column_of(inertias),
+            "K_dyn\nexact": [number(one["k_dyn"], 4) for one in found],
+            "K_dyn\nof the sheet": [number(one["k_dyn_rounded"], 4) for one in found],
+            "start time\nexact, s": column_of([one["start_time"] for one in found], 5),
+            "start time\nof the sheet, s": column_of([one["start_time_rounded"] for one in found], 5),
+        },
+        keys=2,
+    )
+
+
+def outcome(sheet: ParameterSheet) -> str:
+    """What the values of the sheet do, beside the exact ones."""
+    exact, rounded = sheet.exact, sheet.rounded
+    if rounded is None:
+        return f"The start with the rounded values could not be made: {sheet.failure}"
+    text = (
+        f"With these values: K_dyn {number(rounded.k_dyn, 4)}, {rounded.limited_name} "
+        f"{_time(rounded.limited_time)}; with the exact ones {number(exact.k_dyn, 4)} and "
+        f"{_time(exact.limited_time)}."
+    )
+    if not sheet.cells:
+        return text
+    worst = [
+        max((one[key] for one in (cell.summary() for cell in sheet.cells)), key=lambda v: (math.isnan(v), v))
+        for key in ("k_dyn_rounded", "start_time_rounded", "k_dyn", "start_time")
+    ]
+    return (
+        f"{text} In the worst of the {plural(len(sheet.cells), 'cell')} that they were tuned for: K_dyn "
+        f"{number(worst[0], 4)}, {rounded.limited_name} {_time(worst[1])}; with the exact ones "
+        f"{number(worst[2], 4)} and {_time(worst[3])}."
+    )
+
+
+def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
+    """What else is to be known of the values; with `code` where the program of the strategy is from."""
+    drive = sheet.drive.design_drive
+    (rated, basis), found = rated_torque(drive), [sheet.loop]
+    if sheet.margins and sheet.rounded:
+        found.append(f"With these values: {'; '.join(map(str, sheet.margins))}.")
+    if isinstance(sheet.controller, GainSchedule):
+        found.append("The gains of the schedule at the gap and load inertia of this machine.")
+    if not sheet.settings:
+        found.append("This strategy has no parameters.")
+    if sheet.moved:
+        names = listed([one.replace("_", " ") for one in sheet.moved])
+        found.append(f"Not at the nearest step, which would break the rule of the recommendation: {names}.")
+    if sheet.variants:
+        every = "all combinations of" if sheet.corners else "each value alone, and all together,"
+        found.append(f"Half a step off: {sheet.variants} starts, {every} half a step down or up.")
+        found += _half_a_step_off(sheet)
+    limits = listed(sheet.torque_limits(drive))
+    current = " A limit of the torque-producing current: the same percentages." if basis == RATED else ""
+    found.append(
+        f"100 % of torque is the {basis} of {short(float(f'{rated:.5g}'))} N m. Torque limits of the "
+        f"inverter, not tighter than what this start takes: {limits}.{current}"
+    )
+    if coarse := [one.name.replace("_", " ") for one in sheet.settings if one.coarse]:
+        found.append(f"The steps are coarse against {', '.join(coarse)}: look for a finer setting.")
+    found += _ramps(sheet, rated, basis)
+    if sheet.is_code:
+        also = ""
+        if sheet.computes_with:
+            tuned = " that its gains were tuned for" if sheet.own != drive else ""
+            also = f"; beside the sheet it computes with {listed(sheet.computes_with)} of the drive{tuned}"
+        found.append(f"The law is code{also}.")
+    if sheet.computes_with is not None:
+        found.append(
+            "softstart exports this strategy with these values as a program for a PLC, an inverter or a "
+            "simulator (Structured Text, C, FMU), with a test by real starts."
+        )
+    return [one for one in found if one]
+
+
+def _half_a_step_off(sheet: ParameterSheet) -> list[str]:
+    """What values half a step off may break."""
+    permitted, found = sheet.drive.limits.shaft_torque, list[str]()
+    if permitted is not None and sheet.worst_peak > permitted:
+        found.append(
+            f"Half a step off the shaft torque may reach {column_of([sheet.worst_peak])[0]} N m, more than "
+            f"the {short(float(permitted))} N m that are permitted: set these values exactly, or finer ones."
+        )
+    if math.isnan(sheet.worst_k_dyn):
+        found.append("In at least one of them the load does not reach its target speed: set finer steps.")
+    return found
+
+
+def _ramps(sheet: ParameterSheet, rated: float, basis: str) -> list[str]:
+    """The ramp of the torque as other inverters ask for it, and the S-curve in ms."""
+    found = []
+    if rise := sheet.full_rise:
+        found.append(
+            "Some inverters ask for the time of a ramp from 0 to 100 % of torque: that is "
+            f"{_ms(rise.exact)}, a mean rise of {column_of([rated / rise.exact])[0]} N m/s. Set to "
+            f"{short(1e3 * rise.rounded)} ms the rise takes {_ms(rise.rise)}, K_dyn is "
+            f"{number(rise.run.k_dyn, 4)} and the start time {_time(rise.run.start_time)}."
+        )
+    if gear := sheet.gear_ramp:
+        found.append(
+            f"ABB DCS 500B, gear backlash compensation (4000 counts of the {basis}, each 3.3 ms at 50 Hz): "
+            f"GEAR.START TORQ is the initial torque, GEAR.TORQ TIME 0, GEAR.TORQ RAMP "
+            f"{column_of([gear.exact])[0]}, set to {short(gear.rounded)}. The rise then takes "
+            f"{_ms(gear.rise)}, K_dyn is {number(gear.run.k_dyn, 4)} and the start time "
+            f"{_time(gear.run.start_time)}."
+        )
+    if sheet.kind == "s-curve" and sheet.rounded:
+        share, time = sheet.value("rounding"), sheet.value("time")
+        found.append(
+            f"S-curve share {short(100.0 * share)} %: rounded ends of {_ms(0.5 * share * time)} each at the "
+            "beginning and at the end of the rise."
+        )
+    return found
+
+
+def _time(seconds: float) -> str:
+    return f"{column_of([seconds], 5)[0]} s"
+
+
+def _ms(seconds: float) -> str:
+    return f"{column_of([1e3 * seconds])[0]} ms"
