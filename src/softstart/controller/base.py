@@ -231,7 +231,10 @@ class Controller:
         if not missing:
             return self
         derived = self.defaults(drive.design_drive)
-        return replace(self, **{name: derived[name] for name in missing if name in derived})
+        fitted = replace(self, **{name: derived[name] for name in missing if name in derived})
+        if "name" in vars(self):  # one of its own, as an optimum has in tables
+            object.__setattr__(fitted, "name", self.name)
+        return fitted
 
     def regulation(self, drive: Drive) -> Regulation | None:
         """How the start ends if the strategy holds the speed; called on a fitted controller.

@@ -21,7 +21,7 @@ from softstart.page import links, machines
 from softstart.page.duty import fields_of, values_of
 from softstart.page.duty_frames import duty_view, json_number
 from softstart.page.machines import STRATEGY, Axes, FormField
-from softstart.page.sentences import Value, differences, sentence_of, written
+from softstart.page.sentences import Value, differences, page_sentence, sentence_of, written
 from softstart.page.session import LONGEST_DUTY, EqualTime, Inputs, Reference, Session, Strategy
 from softstart.quantities import Units
 from softstart.start.comparison import SOFT_END
@@ -283,7 +283,10 @@ class FrameBuilder:
             yield from session.compute_at_equal_time(label)
             if inputs.at_time:
                 yield {"rows": [row(session, session.result(label))]}
-        advice = [session.recommendation().text, *([NO_STIFFNESS] if inputs.soft_drive else [])]
+        recommendation = session.recommendation()
+        session.follow(recommendation)
+        text = page_sentence(recommendation.text)
+        advice = [text, *([NO_STIFFNESS] if inputs.soft_drive else [])]
         if inputs.machine.limits:
             advice.append(AS_SET_HERE)
         if at_equal_time := session.lowest_at_equal_time():
@@ -291,6 +294,7 @@ class FrameBuilder:
         yield {
             "rows": [row(session, result) for result in session.strategies],
             "recommendation": " ".join(advice),
+            "recommended": recommended.name if (recommended := recommendation.recommended) else "",
             "plausibility_warnings": plausibility_warnings(inputs.machine),
             "assumed": [text for text in inputs.machine.assumed.split("; ") if text],
         }

@@ -63,7 +63,7 @@ def warm(drive: Loaded) -> None:
 def first_strategy(drive: Loaded) -> str:
     """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
-    session.select_lowest_k_dyn()
+    session.offer()
     return session.inputs.selected
 
 
@@ -72,7 +72,7 @@ def build(drive: Loaded) -> Session:
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
-    session.select(first_strategy(drive))
+    session.offer(first_strategy(drive))
     session.restore(session.inputs)  # the page begins here: that is no step to undo
     frames = FrameBuilder(session)
 

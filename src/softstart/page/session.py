@@ -249,6 +249,8 @@ class Session:
         self._past: list[Inputs] = []
         self._future: list[Inputs] = []
         self._gesture = ("", -math.inf)  # what was changed last, and when
+        self._offered = ""  # label that the page itself has selected
+        self._followed: tuple[object, ...] = ()  # machine as loaded, and limits, of the last recommendation
         self.name = secrets.token_urlsafe(9)
         self.version = 0  # how often anything was changed
         self.typed: dict[tuple[str, Any], str] = {}  # texts by path and by the value that they gave
@@ -363,6 +365,7 @@ class Session:
             soft_end=soft_end,
             duty=duty,
         )
+        self._offered = self.inputs.selected
 
     def restore(self, inputs: Inputs) -> None:
         """Begin with earlier inputs, or with those of somebody else; nothing can be undone then."""
@@ -457,12 +460,31 @@ class Session:
             self._equal_time(text)
         self._change(at_time=text)
 
-    def select_lowest_k_dyn(self) -> None:
-        """Select the strategy with the lowest K_dyn of those that settle in good time."""
+    def offer(self, label: str = "") -> None:
+        """Select this strategy until the user selects another one.
+
+        Without a label the recommended one; without limits, or where none keeps them, that with the lowest
+        K_dyn of those that settle in good time.
+        """
+        if not label and self.inputs.machine.limits:
+            label = row.name if (row := self.recommendation().recommended) else ""
+        self.select(label or self._lowest_k_dyn())
+        self._offered = self.inputs.selected
+
+    def follow(self, recommendation: Recommendation) -> None:
+        """Select what is recommended, once for a machine and its limits; not over the user's own choice."""
+        now, row = self.inputs, recommendation.recommended
+        if row is None or self._followed == (key := (now.origin, now.machine.limits)):
+            return
+        self._followed = key
+        if now.selected == self._offered != row.name:
+            self._offered = row.name
+            self._go_to(replace(now, selected=row.name, visible=now.visible | {row.name}))
+
+    def _lowest_k_dyn(self) -> str:
         latest = SLOW * (math.inf if (direct := self.direct()) is None else direct.settled_time)
         timely = [strategy for strategy in self.strategies if strategy.settled_time <= latest]
-        if timely:
-            self.select(min(timely, key=lambda strategy: strategy.k_dyn).name)
+        return min(timely, key=lambda one: one.k_dyn).name if timely else self.inputs.selected
 
     # results -------------------------------------------------------------------------------------------
 

@@ -343,7 +343,8 @@ def recommend(drive: Machine, rows: Iterable[Row], tried: Sequence[Row] = ()) ->
         return _with_limits(limits, rows, able, best, unchecked_life(drive), tried)
     advice = f"For a recommendation, give {drive.LIMITS_GIVEN}." if best else ""
     fact = f"{_pareto_optimal(best, rows)} {unchecked_life(drive)}".rstrip()
-    return Recommendation(Sentence(fact, advice), None, best, limits)
+    page = "For a recommendation, enter limits on the left." if best else ""
+    return Recommendation(Sentence(fact, advice, page), None, best, limits)
 
 
 def _pareto_set(able: Sequence[Row]) -> tuple[Row, ...]:

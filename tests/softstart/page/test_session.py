@@ -134,9 +134,23 @@ def test_the_gentlest_takes_no_more_than_twice_the_time_of_direct(time, selected
     session = Session(controllers=["direct", "ramp"])
     session.select("ramp")
     session.set_parameter("time", time)
-    session.select_lowest_k_dyn()
+    session.offer()
     assert session.inputs.selected == selected
     assert session.result("ramp").k_dyn < session.result("direct").k_dyn
+
+
+def test_what_is_recommended_is_selected_until_the_user_selects_another_one():
+    session = Session(controllers=["direct", "ramp"])
+    session.offer()
+    session.set("limits.shaft_torque", 200.0)
+    before = session.steps
+    session.follow(session.recommendation())
+    assert session.inputs.selected == session.recommendation().recommended.name == "ramp"
+    assert session.steps == before  # it is no step to undo
+    session.select("direct")
+    session.set("limits.shaft_torque", 210.0)
+    session.follow(session.recommendation())
+    assert session.inputs.selected == "direct"
 
 
 def test_of_stored_inputs_the_latest_stay(monkeypatch):

@@ -1,11 +1,12 @@
 // Sliders and fields of the drive: what is typed or slid is sent at once, what the server says is shown.
-import { element, put } from "./numbers.js";
+import { element, put, stored } from "./numbers.js";
 
 const STEPS = 600;
+const FOLDS = "softstart-folds"; // in this tab: those that a hand has opened or closed
 
 export class Controls {
   constructor(place, own, head, duty, say) {
-    Object.assign(this, { say, own, head, duty, rows: new Map(), open: new Map(), groups: place.appendChild(element("div")) });
+    Object.assign(this, { say, own, head, duty, rows: new Map(), open: new Map(JSON.parse(stored("sessionStorage", FOLDS))), groups: place.appendChild(element("div")) });
   }
 
   // the fields of another machine, the first group in the head of the page; or of another strategy
@@ -34,6 +35,7 @@ export class Controls {
   fold(title, place) {
     if (place.open && !this.open.get(title)) place.scrollIntoView({ block: "nearest" });
     this.open.set(title, place.open);
+    stored("sessionStorage", FOLDS, JSON.stringify([...this.open]));
   }
 
   row({ path, symbol, label, meaning, unit, scale: slider, choices, words, text }) {

@@ -91,6 +91,7 @@ export class Instrument {
     if (recommendation !== undefined) {
       put(this.advice, recommendation);
       this.advice.classList.remove("old");
+      state.recommended = frame.recommended;
       this.table.rest();
       const texts = [...plausibility_warnings, ...(assumed.length ? [`Assumed: ${assumed.join(", ")}.`] : [])];
       this.remarks.replaceChildren(...texts.map((text, i) => element("p", { class: i < plausibility_warnings.length ? "doubt" : "" }, text)));

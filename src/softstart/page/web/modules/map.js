@@ -231,7 +231,7 @@ export class GapMap {
 
   // a cross where the drive is
   mark(pen, x, y) {
-    for (const [strokeStyle, lineWidth] of [["#ffffff", 4.5], ["#c2182b", 2]]) {
+    for (const [strokeStyle, lineWidth] of [["#ffffff", 4.5], ["#000000", 2]]) {
       Object.assign(pen, { strokeStyle, lineWidth });
       pen.beginPath();
       pen.arc(x, y, 5, 0, 7);

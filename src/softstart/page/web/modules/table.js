@@ -79,6 +79,8 @@ export class Table {
         line.tr.classList.toggle("selected", selected);
         if (line.radio.checked !== selected) line.radio.checked = selected;
       }
+      line.mark.hidden = name !== state.recommended;
+      line.tr.classList.toggle("recommended", name === state.recommended);
       line.out.hidden = !state.added.includes(name);
       line.changed.hidden = !state.changed.includes(name);
       if (line.asked <= state.stamp) line.asked = -1; // the server knows what was pressed last
@@ -149,8 +151,9 @@ export class Table {
     const bar = element("td", { class: "bar", "data-key": "flag" }, flag);
     const out = button("\u00d7", `Take ${name} out`, () => this.say({ what: "remove", name }), { class: "out", "aria-label": `take ${name} out`, hidden: true });
     const changed = element("span", { class: "changed", title: "with parameters of your own", hidden: true }, "\u2009*");
-    const line = { eye, radio, cells: cells(), bar, flag, out, changed, asked: -1 };
-    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), changed, out));
+    const mark = element("span", { class: "mark", role: "img", title: "recommended", "aria-label": "recommended", hidden: true }, "\u2605");
+    const line = { eye, radio, cells: cells(), bar, flag, mark, out, changed, asked: -1 };
+    const title = element("td", { class: "title" }, element("label", {}, radio, element("span", { title: name }, name), mark, changed, out));
     const onclick = (event) => event.target.closest("input, label, button") || select();
     line.tr = element("tr", { "data-name": name, onclick }, element("td", { class: "eye" }, eye), title, ...line.cells, bar);
     return line;
