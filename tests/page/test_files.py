@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, drawn
 
-from softstart import Chain, DataSheet, Drive, TorqueProfile, export_controller, simulate
+from softstart import Chain, DataSheet, Drive, TorqueProfile, export_controller, parameter_sheet, simulate
 from softstart.controller import make_controller
 
 CRANE = Drive.load("crane-4amtkf")
@@ -140,6 +140,18 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     comes_to(trouble.is_hidden, True)
     name, content = saved(page, "sheet-save")
     assert (name, content.decode()) == ("gantry.toml", sheet.drive_toml())
+
+
+def test_the_parameter_sheet_is_copied_as_a_text(visit: Any) -> None:
+    """For the selected strategy; as a file it is the same text."""
+    page = visit(select="s-curve", permissions=["clipboard-read", "clipboard-write"])
+    page.get_by_role("tab", name="Files", exact=True).click()
+    page.get_by_test_id("parameters-go").click()
+    page.get_by_test_id("parameters-copy").click()
+    wanted = str(parameter_sheet("crane-4amtkf", "s-curve"))
+    comes_to(lambda: page.evaluate("navigator.clipboard.readText()"), wanted)
+    name, content = saved(page, "parameters-file")
+    assert (name, content.decode()) == ("crane-travel-drive-4amtkf-h-112l6-s-curve-parameters.txt", wanted)
 
 
 def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:

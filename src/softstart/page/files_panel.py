@@ -47,7 +47,7 @@ class FilesPanel:
         parts = {
             "Drive": (DriveFiles,),
             "Strategies": (StrategyFiles,),
-            "Export": (Exports, ProgramPanel, ReportPanel),
+            "Export": (Exports, ParameterSheetPanel, ProgramPanel, ReportPanel),
             "Command line": (command_line,),
         }
         for title, panels in parts.items():
@@ -190,6 +190,28 @@ class Exports:
         about = {"drive": inputs.machine.name, "strategy": inputs.selected}
         name, text = profile_file(profile, inputs.selected, suffix, about)
         save(text, name)
+
+
+class ParameterSheetPanel(JobPanel):
+    """What to set on the inverter for the selected strategy, to be copied or saved as a text."""
+
+    name = "parameters"
+    about = (
+        "What to set on the inverter for the selected strategy, tuned gains too: rounded values in its "
+        "units, with the K_dyn of exactly these. Where the strategy does not keep the limits as it is, it is "
+        "set for them. It takes about a second."
+    )
+    verb = "Parameter sheet"
+
+    def form(self) -> None:
+        """The caption."""
+        ui.label("For the inverter").classes("panel-caption")
+
+    def task(self) -> Task:
+        """The sheet."""
+        inputs = self.session.inputs
+        name = file_name(inputs.machine.name, inputs.selected, "parameters", suffix=".txt")
+        return tasks.sheet_task, inputs.both_ends, inputs.controllers[inputs.selected], name
 
 
 class ProgramPanel(JobPanel):

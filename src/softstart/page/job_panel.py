@@ -12,7 +12,7 @@ from nicegui import app, context, ui
 
 from softstart.errors import InputError
 from softstart.page.jobs import Job, Jobs, JobState
-from softstart.page.panel_parts import POLL, Troubles, action, box, hint, notify, reveal, save
+from softstart.page.panel_parts import POLL, Troubles, action, box, copying, hint, notify, reveal, save
 from softstart.page.sentences import changed_since
 from softstart.page.session import Session
 from softstart.views.numbers import cut
@@ -188,6 +188,8 @@ class JobPanel(ABC):
         self._compared = -1
         self._buttons.clear()
         with self._buttons:
+            if result.copy:
+                copying(result.copy, f"{self.name}-copy")
             for file, text in result.files.items():
                 action(file, partial(save, text, file), f"{self.name}-file").props(f'title="Save {file}"')
                 if self.saves and self.mine:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import json
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 from weakref import WeakMethod
@@ -20,6 +21,16 @@ if TYPE_CHECKING:
 
 POLL = 0.2  # s between two checks of a job
 MOST_SENTENCES = 12  # about one input; the next ones appear when these are corrected
+# a page that is served to other machines without TLS has no clipboard of its own
+COPY = """(event) => {
+  const text = %s;
+  if (navigator.clipboard) return navigator.clipboard.writeText(text);
+  const field = document.body.appendChild(document.createElement("textarea"));
+  field.value = text;
+  field.select();
+  document.execCommand("copy");
+  field.remove();
+}"""
 TERMINALS = {
     "synchronous": "both masses at target speed",
     "reached": "load at target speed",
@@ -71,6 +82,12 @@ def action(text: str, act: Callable[[], Any], name: str, main: bool = False) -> 
         f'dense no-caps {"unelevated" if main else "flat"} data-testid="{name}"'
     )
     return button.classes("panel-main" if main else "panel-action")
+
+
+def copying(text: str, name: str) -> ui.button:
+    """A button that puts a text into the clipboard."""
+    button = action("Copy", lambda: notify("Copied as text."), name)
+    return button.on("click", js_handler=COPY % json.dumps(text))
 
 
 def upload(

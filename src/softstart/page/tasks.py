@@ -47,13 +47,15 @@ INTERVAL = 0.1  # s between two reports of a task that would report thousands of
 class TaskResult:
     """The result of a task: HTML to show, contents of files by name, and what may be taken over from it.
 
-    `controllers` may join the strategies, by label; `drive` may become that of the page.
+    `controllers` may join the strategies, by label; `drive` may become that of the page; `copy` is what a
+    button puts into the clipboard.
     """
 
     html: str
     files: Mapping[str, str | bytes] = field(default_factory=dict)
     controllers: Mapping[str, Controller] = field(default_factory=dict)
     drive: Machine | None = None
+    copy: str = ""
 
 
 def shown(*sheets: Sheet, first: bool = False) -> str:
@@ -270,6 +272,15 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
     label = f"quickest {best.end_time:.4g} s"
     quickest = optimum_sheet(best, [row.run for row in compared.rows])
     return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player_of(best, label)})
+
+
+def sheet_task(drive: Loaded, controller: Controller, file: str, *, progress: Progress) -> TaskResult:
+    """The parameter sheet of a strategy: rounded values, and the start with exactly these."""
+    from softstart.reporting.sheet import parameter_sheet
+
+    progress(None, "rounding, and starting the drive half a step off")
+    found = parameter_sheet(drive, controller)
+    return TaskResult(shown(found.sheet), {file: str(found)}, copy=str(found))
 
 
 def report_task(
