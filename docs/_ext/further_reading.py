@@ -27,6 +27,7 @@ PAGES = {
     "softstart.linear": ("linear-view",),
     "softstart.optimal": ("optimal-starts", "theory/optimum"),
     "softstart.profile": ("optimal-starts", "theory/optimum"),
+    "softstart.project": ("howto/keep-a-project",),
     "softstart.reporting": ("howto/read-a-report",),
     "softstart.start": ("theory/stages", "theory/reduction", "theory/numerics"),
     "softstart.start.comparison": ("theory/stages", "controllers"),

@@ -52,6 +52,7 @@ from softstart.optimal.result import InfeasibleError as InfeasibleError
 from softstart.optimal.result import Optimum as Optimum
 from softstart.optimal.result import OptimumError as OptimumError
 from softstart.profile import TorqueProfile as TorqueProfile
+from softstart.project import Project as Project
 from softstart.reporting.result import Report as Report
 from softstart.reporting.result import report as report
 from softstart.reporting.sheet import ParameterSheet as ParameterSheet

@@ -263,8 +263,12 @@ class TorqueProfile(OneLine):
 
         write_whole(Path(path), write)
 
-    def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
-        """Write TOML that the `profile` controller follows; `about` says where the profile comes from."""
+    def toml_text(self, about: Mapping[str, object] | None = None) -> str:
+        """TOML that the `profile` controller follows; `about` says where the profile comes from.
+
+        >>> TorqueProfile.read(TorqueProfile([0.0, 0.1], [20.0, 62.0]).toml_text(), ".toml").end
+        0.1
+        """
         parts = [
             "# A torque profile: softstart simulate DRIVE --controller profile --param file=THIS_FILE",
             '[controller]\nname = "profile"',
@@ -275,7 +279,11 @@ class TorqueProfile(OneLine):
         if about:
             lines = [f"{_text_literal(key)} = {_text_literal(value)}" for key, value in about.items()]
             parts.append("\n".join(["[about]", *lines]))
-        write_whole(Path(path), lambda stream: stream.write("\n\n".join(parts) + "\n"))
+        return "\n\n".join(parts) + "\n"
+
+    def to_toml(self, path: str | Path, about: Mapping[str, object] | None = None) -> None:
+        """Write `toml_text` into a file."""
+        write_whole(Path(path), lambda stream: stream.write(self.toml_text(about)))
 
     def to_c(
         self, path: str | Path, name: str = "torque_profile", about: Mapping[str, object] | None = None
@@ -315,13 +323,22 @@ class TorqueProfile(OneLine):
         InputError
             In one sentence that names the file, the place and the value.
         """
-        where, suffix, profile = f"profile = {path}", Path(path).suffix.lower(), None
+        where, suffix = f"profile = {path}", Path(path).suffix.lower()
         if suffix not in (".toml", ".csv", ".txt", ".dat"):
             raise InputError(f"{where}: its kind is unknown; give a file whose name ends in .csv or .toml.")
         try:
-            text = read_text(Path(path))
+            return cls.read(read_text(Path(path)), suffix, where)
         except RefusedError as refusal:
             raise InputError(f"{where}: {refusal.reason}.") from None
+
+    @classmethod
+    def read(cls, text: str, suffix: str = ".csv", where: str = "profile") -> TorqueProfile:
+        """A profile from the text of a file whose name ends in `suffix`; `where` begins each sentence.
+
+        >>> TorqueProfile.read("time,torque\\n0,20\\n0.1,62\\n").torque.tolist()
+        [20.0, 62.0]
+        """
+        profile = None
         if suffix == ".toml":
             parts = _from_toml(text, where)
         else:

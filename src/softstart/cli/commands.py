@@ -24,7 +24,9 @@ PURPOSES = {
         "linear": "starts", "duty": "duty",
     },
     "Design": {"optimize": "optimize", "pareto": "optimize", "tune": "tune", "sweep": "sweep"},
-    "Results": {"serve": "serve", "report": "report", "sheet": "report", "export": "export"},
+    "Results": {
+        "serve": "serve", "report": "report", "sheet": "report", "project": "project", "export": "export",
+    },
     "Other machines and tools": {
         "clutch": "machines", "balance": "machines", "study": "lists", "completion": "completion",
     },

@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from softstart.input.files import write_whole
 if TYPE_CHECKING:
     from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
+    from softstart.reporting import Report
 
 BROWSERS = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
@@ -71,6 +73,18 @@ def report_command(
         TOML file with customer, project, author, logo, revisions, approval, data sources, paper size and
         decimal sign (example in docs/howto/read-a-report.md).
     """
+
+    def make(progress: Callable[[float, str], object], command: str) -> Report:
+        from softstart.reporting import report as compute
+
+        strategies = controllers_from_options(controllers, params)
+        return compute(drive, controllers=strategies, command=command, progress=progress, **arguments)
+
+    return written_report(make, to, pdf)
+
+
+def written_report(make: Callable[..., Report], to: str | None, pdf: str | None) -> Output:
+    """The report of `make(progress, command)`, written to the files of --out and --pdf."""
     if to is None and pdf is None and not option_value("as_json"):
         raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
     for flag, path in (("--out", to), ("--pdf", pdf)):
@@ -78,12 +92,7 @@ def report_command(
             _check_file(flag, path)
     browser = "" if pdf is None else _browser()
     with working("starting the drive ...") as show, attributed():
-        from softstart.reporting import report as compute
-
-        report = compute(
-            drive, controllers=controllers_from_options(controllers, params), command=options.typed_command(),
-            progress=lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), **arguments,
-        )  # fmt: skip
+        report = make(lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), options.typed_command())
         show("drawing the figures")
         page = "" if to is None and pdf is None else report.to_html()
     with options.named_as_options(output="--out"):

@@ -13,9 +13,11 @@ from pathlib import Path
 from softstart.controller.base import Controller, label_of
 from softstart.controller.parameters import declared_parameters
 from softstart.controller.tuned import (
+    GainFile,
     RobustFile,
     RobustGains,
-    Tuned,
+    ScheduleFile,
+    Settings,
     is_gain_file,
     read_gain_file,
     refused_file,
@@ -104,7 +106,7 @@ def make_controller(
             "or a Controller object."
         )
     if isinstance(name, str) and is_gain_file(name):
-        return _tuned(Path(name), parameters, allow_code)
+        return controller_of(read_gain_file(Path(name)), Path(name), Path(name).stem, parameters, allow_code)
     cls = controller_class(name)
     name = name if isinstance(name, str) else label_of(cls)
     values, wrong = _values(cls, name, parameters or {})
@@ -125,9 +127,14 @@ def make_controller(
     return cls(**values)
 
 
-def _tuned(path: Path, parameters: Mapping[str, object] | None, allow_code: bool) -> Tuned:
-    """The controller with the gains of a file."""
-    saved = read_gain_file(path)
+def controller_of(
+    saved: GainFile,
+    path: Path,
+    label: str,
+    parameters: Mapping[str, object] | None = None,
+    allow_code: bool = False,
+) -> Controller:
+    """The controller with the gains or settings of the file `path`, named after this label."""
     if is_gain_file(saved.controller):
         raise refused_file(
             path, f"controller = {show(saved.controller)}: gains are those of a controller, not of a file"
@@ -146,10 +153,19 @@ def _tuned(path: Path, parameters: Mapping[str, object] | None, allow_code: bool
     try:
         if isinstance(saved, RobustFile):
             made = make_controller(saved.controller, saved.parameters)
-            return RobustGains(path.stem, made, saved.drive, saved.gaps, saved.load_inertias)
-        return scheduled(saved, path.stem, make_controller(saved.controller, saved.fixed))
+            return RobustGains(label, made, saved.drive, saved.gaps, saved.load_inertias)
+        if isinstance(saved, ScheduleFile):
+            return scheduled(saved, label, make_controller(saved.controller, saved.fixed))
+        made = make_controller(saved.controller, saved.parameters)
+        return made if label == saved.controller else Settings(label, made)
     except InputError as error:
         raise InputError([f'controller = "{path}": {sentence}' for sentence in error.sentences]) from None
+
+
+def named(controller: Controller, label: str) -> Controller:
+    """The controller under this name in tables; the controller itself is changed."""
+    object.__setattr__(controller, "name", label)
+    return controller
 
 
 def changed_controller(controller: Controller, changes: Mapping[str, object]) -> Controller:

@@ -30,7 +30,7 @@ from softstart.quantities import RefusedError
 
 Scale = Literal["linear", "logarithmic"]
 
-ROBUST, SCHEDULE = "robust set", "gain schedule"
+ROBUST, SCHEDULE, SETTINGS = "robust set", "gain schedule", "settings"
 AXES = ("gap", "load_inertia")
 
 
@@ -68,6 +68,15 @@ class ScheduleFile(NamedTuple):
     gains: dict[str, Gain]
     fixed: dict[str, object]
 
+
+class SettingsFile(NamedTuple):
+    """A controller with parameters of its own, set up for whatever drive it starts."""
+
+    controller: str
+    parameters: dict[str, object]
+
+
+GainFile = RobustFile | ScheduleFile | SettingsFile
 
 # ---- controllers ----------------------------------------------------------------------------------------
 
@@ -132,6 +141,21 @@ class RobustGains(Tuned):
     def parameters(self) -> dict[str, object]:
         """Those of the controller as it is set up."""
         return self.controller.set_up(self.nominal)[0].parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Settings(Tuned):
+    """A controller with parameters of its own, under a name that distinguishes it from the defaults."""
+
+    def set_up(self, drive: Drive) -> tuple[Controller, Drive]:
+        """The controller set up for the drive."""
+        ready, drive_of_gains = self.controller.set_up(drive)
+        return self._called(ready), drive_of_gains
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """Those of the controller."""
+        return self.controller.parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,7 +277,7 @@ def derived_from_nominal(tuned: RobustGains, given: Controller, drives: Iterable
 # ---- reading --------------------------------------------------------------------------------------------
 
 
-def read_gain_file(path: Path) -> RobustFile | ScheduleFile:
+def read_gain_file(path: Path) -> GainFile:
     """Tuned gains from a file. Raises InputError in sentences that name file, key and remedy."""
     try:
         text = read_text(path)
@@ -263,14 +287,16 @@ def read_gain_file(path: Path) -> RobustFile | ScheduleFile:
     return read_gains(text, path)
 
 
-def read_gains(text: str, path: Path) -> RobustFile | ScheduleFile:
-    """Tuned gains from the text of the file `path`."""
+def read_gains(text: str, path: Path) -> GainFile:
+    """Tuned gains, or settings, from the text of the file `path`."""
     document = parsed(text, Wording(f'controller = "{path}"', style="toml"), "a gain")
     kind = document.get("kind")
     if kind == ROBUST:
         return _read_robust(document, path)
     if kind == SCHEDULE:
         return _read_schedule(document, path)
+    if kind == SETTINGS:
+        return SettingsFile(_name(document, path), dict(_section(document, "parameters", path)))
     raise refused_file(
         path,
         "this file holds no tuned gains; give one that softstart tune has written, or play a torque profile "
@@ -429,6 +455,34 @@ def schedule_text(
     if about:
         blocks.append(_table("about", about))
     return "\n\n".join(blocks) + "\n"
+
+
+def strategy_text(controller: Controller) -> str:
+    """The TOML text of a controller: of tuned gains theirs, of any other its settings.
+
+    >>> from pathlib import Path
+    >>> from softstart.controller import make_controller
+    >>> read_gains(strategy_text(make_controller("ramp", {"time": "120 ms"})), Path("mine.toml"))
+    SettingsFile(controller='ramp', parameters={'time': 0.12})
+    """
+    base = controller.controller if isinstance(controller, Tuned) else controller
+    name = type(base).name or label_of(base)
+    values = {one.name: getattr(base, one.name) for one in fields(base)}
+    given: dict[str, object] = {
+        key: value for key, value in values.items() if isinstance(value, str | int | float)
+    }
+    if isinstance(controller, RobustGains):
+        cells = (
+            {"gaps": controller.gaps, "load_inertias": controller.load_inertias} if controller.gaps else None
+        )
+        return robust_text(RobustFile(name, given, controller.nominal), cells, meanings_of(base))
+    if isinstance(controller, GainSchedule):
+        gains = {gain: Gain(scale, values) for gain, scale, values in controller.gains}
+        fixed = {key: value for key, value in given.items() if key not in gains}
+        grid = ScheduleFile(name, controller.gaps, controller.load_inertias, gains, fixed)
+        return schedule_text(grid, None, meanings_of(base))
+    head = f"kind = {literal(SETTINGS)}\ncontroller = {literal(name)}"
+    return "\n\n".join([head, _table("parameters", given, meanings_of(base))]) + "\n"
 
 
 def schedule_csv(saved: ScheduleFile, columns: Mapping[str, NDArray[np.float64]] | None = None) -> str:

@@ -232,13 +232,21 @@ class Duty(ParameterFile):
         >>> Duty.load_for(Drive.load("crane-4amtkf"), "hoist") == Duty.load("hoist")
         True
         """
+        text, where = cls.LIBRARY.find(name)
+        return cls.read_for(machine, text, where, also)
+
+    @classmethod
+    def read_for(
+        cls, machine: Machine, text: str, where: str = "", also: Mapping[str, object] | None = None
+    ) -> Duty:
+        """As `load_for`, from the text of a file."""
 
         class OfMachine(Duty):
             @classmethod
             def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
                 return machine.gear_with()
 
-        duty = OfMachine.load(name, also)
+        duty = OfMachine.from_toml(text, where=where, also=also)
         return cls(duty.steps, shift=duty.shift)
 
     @classmethod

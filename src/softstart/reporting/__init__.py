@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from softstart.reporting.project import Project
 from softstart.reporting.result import Report, report
 from softstart.start.resolution import Resolution
 
-__all__ = ["Project", "Report", "Resolution", "report"]
+__all__ = ["Report", "Resolution", "report"]

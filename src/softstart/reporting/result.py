@@ -24,9 +24,9 @@ from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, Mistakes, SimulationError, fact_of
 from softstart.input.files import write_whole
+from softstart.project import Project
 from softstart.reporting.choice import Choice, RobustnessMap, robustness
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
-from softstart.reporting.project import Project
 from softstart.reporting.sheet import ParameterSheet, make_sheet
 from softstart.results import Result
 from softstart.start.comparison import (
@@ -315,7 +315,8 @@ def report(
     command : str, optional
         The command that makes the same report, for the provenance.
     project : Project, str or Path, optional
-        Customer, author, revisions, sources of the data, paper size and decimal sign, or their TOML file.
+        A project, or its TOML file: customer, author, revisions, sources of the data, paper size and
+        decimal sign.
 
     Returns
     -------
@@ -341,7 +342,7 @@ def report(
     ----------
     K_dyn: [G] (16).
     """
-    about = project if isinstance(project, Project) else Project.load(project) if project else Project()
+    about = project if isinstance(project, Project) else Project.open(project) if project else Project()
     known, drawn, soft = as_far_as_known(drive)
     machine = as_machine(known)
     if budget is None:

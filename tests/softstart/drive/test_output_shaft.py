@@ -16,8 +16,8 @@ from softstart.controller.recipe import Recipe
 from softstart.drive import PARAMETERS
 from softstart.drive.model import BY_PATH
 from softstart.drive.plausibility import plausibility_warnings
+from softstart.project import Project
 from softstart.reporting.document import data_of
-from softstart.reporting.project import Project
 from softstart.start.recommendation import Row
 from softstart.sweeping.grid import Subject
 from softstart.tuning.problem import gaps_of, inertias_of, tuning_scenarios

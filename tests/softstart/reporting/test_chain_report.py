@@ -7,7 +7,8 @@ import re
 import pytest
 
 from softstart import Chain, InputError, fatigue, simulate
-from softstart.reporting import Project, Report, report
+from softstart.project import Project
+from softstart.reporting import Report, report
 from softstart.reporting.limit import bound_at
 
 from .conftest import Page

@@ -10,7 +10,8 @@ import pytest
 from softstart import Drive
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import InputError
-from softstart.reporting import Project, document, report
+from softstart.project import Project
+from softstart.reporting import document, report
 from softstart.reporting.document import css_string
 
 from .conftest import Page, verbatim

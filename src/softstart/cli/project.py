@@ -1,0 +1,102 @@
+"""`softstart project`: the machines, strategies, optima and duties of a job in one file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from softstart.cli import options
+from softstart.cli.options import command, option
+from softstart.cli.report import written_report
+from softstart.cli.running import Output, answers, attributed, working
+from softstart.errors import InputError
+
+if TYPE_CHECKING:
+    from softstart.project import Project
+    from softstart.reporting import Report
+
+
+@command("project")
+@click.argument("action", metavar="new|open|report", type=click.Choice(["new", "open", "report"]))
+@click.argument("file")
+@click.argument("parts", nargs=-1)
+@option("--check", is_flag=True)
+@option("--out to")
+@option("--pdf")
+@option("--resolution")
+@option("--budget", options.quantity("s", least=0.0))
+@answers()
+def project_command(
+    *, action: str, file: str, parts: tuple[str, ...], check: bool, to: str | None, pdf: str | None,
+    **steps: Any,
+) -> Output:  # fmt: skip
+    """Keep the machines, strategies, optima and duties of a job in one file.
+
+    "new" makes FILE from PARTS: machines (files or shipped names), tuned gains (robust.toml, schedule.toml),
+    torque profiles (CSV, TOML) and duties, each called by its file's name; the first machine is chosen.
+    "open" shows what is in FILE. "report" writes the report of the machine and the strategy that are chosen.
+    Names, notes and the choice are edited in the file, which is TOML (see docs/howto/keep-a-project.md).
+
+    Options
+    -------
+    --check
+        With open: start each optimum again on its machine, and check what it claims.
+    --out FILE
+        With report: HTML file to write, for example report.html.
+    --pdf FILE
+        With report: PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.
+    --resolution KEY=STEP,...
+        With report: resolution of the inverter parameters, for example torque=0.5%,time=10ms.
+    --budget TIME
+        With report: time limit of numerical optimisation, for example 60 (s).
+    """
+    from softstart.project import Project
+
+    if parts and action != "new":
+        raise InputError(f'"{parts[0]}": "{action}" takes one file; leave this word out.')
+    if action == "new":
+        return _new(Project, Path(file), parts)
+    project = Project.open(file)
+    if action == "report":
+        return written_report(lambda *shown: _report(project, *shown, **steps), to, pdf)
+    return _shown(project, check)
+
+
+def _new(kind: type[Project], path: Path, parts: tuple[str, ...]) -> Output:
+    if path.exists():
+        raise InputError(f'FILE = "{path}": there is such a file already, which is kept; name another one.')
+    if not parts:
+        raise InputError('PARTS: name at least one machine, as "softstart project new job.toml mine.toml".')
+    project = kind.new(*parts)
+    with options.named_as_options(output="FILE"):
+        project.save(path)
+    data, sheet = _shown(project)
+    return data, replace(sheet, notes=[*sheet.notes, f"Written to {path}."])
+
+
+def _shown(project: Project, check: bool = False) -> tuple[Any, Any]:
+    from softstart.views.projects import project_sheet
+
+    checks = {}
+    with working("starting the optima ..."), attributed():
+        for one in project.optima if check else ():
+            checks[one.name] = max(run.k_dyn for run in one.checked(project.single(one.machine)))
+    return project.summary, project_sheet(project, checks)
+
+
+def _report(project: Project, progress: Any, typed: str, **steps: Any) -> Report:
+    from softstart.project.parts import refuse_longer
+    from softstart.reporting import report
+    from softstart.start.simulation import simulate
+
+    machine, chosen = project.loaded(), project.strategy
+    if chosen in [one.name for one in project.strategies]:
+        start = simulate(project.single(), project.controller())
+        refuse_longer(start, f'strategy "{chosen}"')
+    controllers = [project.controller()] if chosen else None
+    return report(
+        machine, controllers=controllers, command=typed, progress=progress, project=project, **steps
+    )

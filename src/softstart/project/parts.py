@@ -1,0 +1,250 @@
+"""What a project holds: whole files of machines, strategies and duties by name, and answers of optima."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from softstart.chain.machines import is_chain_text
+from softstart.controller.base import Controller
+from softstart.controller.finding import controller_of, make_controller, named
+from softstart.controller.tuned import read_gains, strategy_text
+from softstart.drive import Duty, Machine
+from softstart.drive.data_sheet import DataSheet
+from softstart.errors import InputError
+from softstart.input.documents import parsed
+from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
+from softstart.input.parameters import REQUIRED, Wording
+from softstart.profile import TorqueProfile
+
+if TYPE_CHECKING:
+    from softstart.optimal.result import Optimum
+    from softstart.start.run import Run
+
+LONGER = 1.01  # times the end of the start: an optimum ends with it, but for the accuracy of its end
+
+
+def _text(path: str, meaning: str, example: str, default: object = REQUIRED, **more: Any) -> Any:
+    return parameter(path, "", meaning, example, default=default, **more)
+
+
+def _name(table: str) -> Any:
+    return parameter(f"{table}.name", "", "name in the project", '"crane"', "one line")
+
+
+def _file(table: str) -> Any:
+    return _text(f"{table}.file", "text of its file", "'''...'''")
+
+
+class StoredMachine(ParameterSet):
+    """The file of a machine."""
+
+    WHAT: ClassVar[str] = "a machine of a project"
+
+    name: str = _name("machine")
+    file: str = _file("machine")
+
+
+class StoredStrategy(ParameterSet):
+    """The file of tuned gains, settings, or a torque profile."""
+
+    WHAT: ClassVar[str] = "a strategy of a project"
+
+    name: str = _name("strategy")
+    file: str = _file("strategy")
+
+    @property
+    def controller(self) -> Controller:
+        """The controller under its name in the project."""
+        return strategy_of(self.file, self.name)
+
+
+class StoredDuty(ParameterSet):
+    """The file of a duty."""
+
+    WHAT: ClassVar[str] = "a duty of a project"
+
+    name: str = _name("duty")
+    file: str = _file("duty")
+
+
+class StoredOptimum(ParameterSet):
+    """The answer of an optimum with its claims, so that it can be checked on the exact machine.
+
+    Parameters
+    ----------
+    {parameters}
+
+    Raises
+    ------
+    InputError
+        With a sentence for each mistake.
+
+    Examples
+    --------
+    >>> from softstart import Drive, optimize
+    >>> crane = Drive.load("crane-4amtkf").replace(target_speed=60.0)
+    >>> stored = StoredOptimum.of(optimize(crane, 0.2883042), "lowest", "crane")
+    >>> [round(run.k_dyn, 4) for run in stored.checked(crane)]
+    [0.9092]
+
+    References
+    ----------
+    docs/howto/keep-a-project.md.
+    """
+
+    WHAT: ClassVar[str] = "an optimum of a project"
+
+    # fmt: off
+    name: str = _name("optimum")
+    machine: str = _text("optimum.machine", "name of its machine in the project", '"crane"')
+    end_time: Number = parameter("optimum.end_time", "s", "time at which the start has ended", "0.288",
+        "above 0")
+    claimed: Number = parameter("optimum.claimed", "1", "figure that was minimised", "0.909", "0 or more")
+    minimise: str = _text("optimum.minimise", "what was minimised", '"k_dyn"', "k_dyn",
+        choices=("k_dyn", "heat", "start_time"))
+    terminal: str = _text("optimum.terminal", "what holds at its end", '"reached"',
+        choices=("synchronous", "steady", "reached"))
+    start_time: MaybeNumber = parameter("optimum.start_time", "s", "bound on the start time", "0.288",
+        "above 0", default=None)
+    k_dyn: MaybeNumber = parameter("optimum.k_dyn", "1", "bound on K_dyn", "1.2", "above 0", default=None)
+    heat: MaybeNumber = parameter("optimum.heat", "s", "bound on the heat", "0.2", "above 0", default=None)
+    bound: Number = parameter("optimum.bound", "1", "K_dyn that no start of its class goes below", "0.909",
+        "0 or more", default=0.0)
+    bound_kind: str = _text("optimum.bound_kind", "how the bound is proved", '"momentum"', "none",
+        choices=("duality", "momentum", "none"))
+    bound_covers: str = _text("optimum.bound_covers", "starts for which it is proved", '"every torque"', "")
+    file: str = _file("optimum")
+    # fmt: on
+
+    @classmethod
+    def of(cls, best: Optimum, name: str, machine: str) -> StoredOptimum:
+        """An optimum of this machine of the project; InputError for one that serves several machines."""
+        problem = best.problem
+        if problem.scenarios or problem.base or problem.torque_speed:
+            raise InputError(
+                f'optimum "{name}": it serves several machines or keeps a torque-speed curve, which a '
+                "project does not hold; save its profile as a strategy."
+            )
+        return cls(
+            name=name, machine=machine, end_time=best.end_time, claimed=best.minimised,
+            minimise=problem.minimise, terminal=problem.terminal, start_time=problem.start_time,
+            k_dyn=problem.k_dyn, heat=problem.heat, bound=best.bound.k_dyn, bound_kind=best.bound.kind,
+            bound_covers=best.bound.covers, file=best.profile.toml_text(),
+        )  # fmt: skip
+
+    @property
+    def profile(self) -> TorqueProfile:
+        """Its torque."""
+        return TorqueProfile.read(self.file, ".toml", f'optimum "{self.name}"')
+
+    @property
+    def controller(self) -> Controller:
+        """What plays it."""
+        return player_of(self.profile, self.name)
+
+    def checked(self, machine: Machine) -> tuple[Run, ...]:
+        """Its starts on the exact machine; OptimumError where a claim or a bound does not hold there."""
+        from softstart.optimal.check import check, replayed
+        from softstart.optimal.problem import Problem
+        from softstart.optimal.result import LowerBound
+
+        choices: Any = {"minimise": self.minimise}
+        problem = Problem(
+            machine, self.start_time, self.terminal, k_dyn=self.k_dyn, heat=self.heat, **choices
+        )
+        kind: Any = self.bound_kind
+        runs = replayed(problem, self.profile, self.end_time)
+        bound = LowerBound(self.bound, kind, self.bound_covers)
+        check(problem, self.profile, runs, self.end_time, self.claimed, bound)
+        return runs
+
+
+def player_of(profile: TorqueProfile, label: str) -> Controller:
+    """The controller that plays a profile, under this name in tables.
+
+    >>> player_of(TorqueProfile([0.0], [62.0]), "mine").name
+    'mine'
+    """
+    return named(make_controller("profile", {"profile": profile}), label)
+
+
+def strategy_of(text: str, name: str) -> Controller:
+    """The tuned gains, the settings or the player of the torque profile of a file, called `name`.
+
+    >>> strategy_of("time,torque\\n0,20\\n0.1,62\\n", "mine").profile.torque.tolist()
+    [20.0, 62.0]
+    """
+    where, toml = f'strategy "{name}"', is_toml(text)
+    if toml and "kind" in parsed(text, Wording(where, style="toml"), "a strategy"):
+        path = Path(name)
+        saved = read_gains(text, path)
+        inner = re.fullmatch(rf"{re.escape(saved.controller)} \((.+)\)", name)
+        try:
+            return controller_of(saved, path, inner[1] if inner else name)
+        except InputError as error:
+            raise InputError([one.replace("controller =", "strategy =") for one in error.sentences]) from None
+    return player_of(TorqueProfile.read(text, ".toml" if toml else ".csv", where), name)
+
+
+def profile_of(controller: Controller) -> TorqueProfile | None:
+    """The torque profile that a controller plays; None for one that plays none.
+
+    >>> profile_of(make_controller("direct")) is None
+    True
+    """
+    profile = getattr(controller, "profile", None)
+    return profile if isinstance(profile, TorqueProfile) else None
+
+
+def refuse_longer(run: Run, subject: str) -> None:
+    """InputError where the profile that is played in this start goes on after it; `subject` begins it."""
+    profile = None if run.controller is None else profile_of(run.controller)
+    if profile is not None and (end := profile.simplified().end) > LONGER * run.end_time:
+        raise InputError(
+            f'{subject}: its torque changes until {end:.4g} s, and the start of "{run.drive.name}" '
+            f"has ended at {run.end_time:.4g} s; shorten the profile, or correct the unit of its time."
+        )
+
+
+def file_of(thing: Machine | Duty | TorqueProfile | Controller) -> str:
+    """The text of the file of a machine, duty, profile or strategy, as `softstart` writes it."""
+    if isinstance(thing, TorqueProfile):
+        return thing.toml_text()
+    if isinstance(thing, Controller):
+        profile = profile_of(thing)
+        return strategy_text(thing) if profile is None else profile.toml_text()
+    return thing.to_toml()
+
+
+def is_toml(text: str) -> bool:
+    """Whether a text is meant as TOML: a line of it is a table or gives a key its value."""
+    return re.search(r"^\s*(\[+[\w. \"-]+\]+|[\w\"-]+\s*=.*)\s*(#.*)?$", text, re.MULTILINE) is not None
+
+
+def kind_of(text: str, where: str) -> str:
+    """What the text of a file is: "machine", "strategy" or "duty"; InputError for anything else.
+
+    >>> kind_of("[[duty]]", ""), kind_of("time,torque", ""), kind_of("[motor]", "")
+    ('duty', 'strategy', 'machine')
+    """
+    if not is_toml(text):
+        return "strategy"
+    if is_chain_text(text):
+        return "machine"
+    document = parsed(text, Wording(where, style="toml"), "a project's part")
+    for kind in _kinds(document):
+        return kind
+    reason = "this is no machine, strategy or duty; give a file that softstart reads as one of them"
+    raise InputError(f"{where}: {reason}.")
+
+
+def _kinds(document: dict[str, Any]) -> Iterator[str]:
+    if {"kind", "profile"} & document.keys():
+        yield "strategy"
+    if {"motor", "shaft"} & document.keys() or DataSheet.describes(document):
+        yield "machine"
+    if "duty" in document:
+        yield "duty"
