@@ -237,6 +237,38 @@ def test_the_recommended_strategy_is_marked_and_its_figure_is_the_large_one(visi
     assert page.locator(".figure .name").inner_text() == "direct"
 
 
+def test_the_switch_to_the_output_changes_fields_table_canvases_and_the_map(page):
+    """A press on the map sets what its read-out says; a reload keeps the switch."""
+    output = page.locator('.shaft input[value="output"]')
+    assert output.is_disabled()  # without a gear
+    page.locator("details:has(summary:text('Gear')) summary").click()
+    enter(page, "gear.ratio", "38")
+    comes_to(output.is_enabled, True)
+    output.check(force=True)
+    shows(page, "shaft.gap", "0.0131579")
+    peak = simulate(CRANE, "direct").peak_torque
+    cell = page.locator('tr[data-name="direct"] td[data-key="peak_torque"]')
+    comes_to(cell.inner_text, f"{38.0 * peak:.0f}")
+    at_rest(page)
+    assert page.evaluate(f"{INSTRUMENT}.plots.main.units.at") == ", at the output"
+    box = page.locator(".map canvas").bounding_box()
+    place = box["x"] + 0.62 * box["width"], box["y"] + 0.3 * box["height"]
+    page.mouse.move(*place)
+    comes_to(lambda: "rad" in page.locator(".said").inner_text(), True)
+    read = float(re.search(r"\S+ (\S+) rad", page.locator(".said").inner_text())[1])
+    page.mouse.click(*place)
+    page.wait_for_function("document.getElementById('field-shaft-gap').value != '0.0131579'")
+    gap = float(field(page, "shaft.gap").input_value())
+    assert gap == pytest.approx(read, rel=1e-3)
+    inertia = float(field(page, "load.inertia").input_value())
+    drive = CRANE.replace(gap=38.0 * gap, load_inertia=inertia / 38.0**2)
+    comes_to(cell.inner_text, f"{38.0 * simulate(drive, 'direct').peak_torque:.0f}")
+    kept(page)
+    page.reload()
+    opened(page)
+    comes_to(output.is_checked, True)
+
+
 @pytest.mark.parametrize("width", [1920, 1280, 1024, 768])
 def test_the_data_sheet_lies_over_nothing(visit, width):
     page = visit(width, 1080)

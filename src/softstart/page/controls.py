@@ -63,6 +63,7 @@ class Controls:
             "remove": (session.remove, {"name": str}),
             "fix": (self._fix, {"fixed": bool}),
             "reference": (session.set_reference, {"on": bool}),
+            "show_at": (session.show_at, {"output": bool}),
             "at_time": (session.set_at_time, {"text": str}),
             "duty_step": (self._duty_step, {"index": float}),
             "duty_add": (self._duty_add, {"index": float, "do": str}),
@@ -103,11 +104,12 @@ class Controls:
         return self._frames.entries[path]
 
     def _slide(self, path: str, position: float) -> None:
-        entry, units = self._entry(path), self._session.inputs.units
+        entry = self._entry(path)
+        units = entry.seen(self._session.inputs.units)
         if entry.scale is None:
             raise InputError(f"{path}: there is no such slider.")
         value = entry.scale.value(position)
-        if units.of(entry.unit) != entry.unit:
+        if units.of(entry.unit) != entry.unit or units.gear:
             value = units.rounded(value, entry.unit, DIGITS)
         self._session.set(path, value, gesture=path)
 
@@ -117,7 +119,10 @@ class Controls:
             raise InputError(
                 f"{path}: the text has more than {LONGEST_TEXT} characters; write {entry.example}."
             )
-        words = self._session.inputs.units.typed(" ".join(text.split()), entry.unit)
+        units = self._session.inputs.units
+        words = entry.seen(units).typed(" ".join(text.split()), entry.unit)
+        if path == "units" and words and units.gear and "at " not in words:  # the switch beside it says which
+            words += ", at output"
         if not (words or entry.optional):
             raise InputError(f"{path}: the field is empty; write for example {entry.example}.")
         self._session.set(path, words or None)

@@ -36,7 +36,7 @@ def json_number(value: float) -> float | None:
 
 def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
     """The strip of steps with the figures of each, and their trace; `result` is None until it is computed."""
-    plan = inputs.plan
+    plan, units = inputs.plan, inputs.units.at_motor
     view: Frame = {
         "kinds": dict(KINDS),
         "selected": step,
@@ -44,7 +44,8 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
         "waits": result is None,
         "trouble": "" if result is None else result.trouble,
         "strategy": inputs.selected,
-        "units": {name: inputs.units.of(si) for name, si in (("angle", "rad"), ("speed", "rad/s"))},
+        "units": {name: units.of(si) for name, si in (("angle", "rad"), ("speed", "rad/s"))},
+        "at": ", at the motor" if inputs.units.gear else "",
         "trace": None,
         "toml": "",
     }
@@ -57,7 +58,7 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
     rows, (life, reason) = zip(view["steps"], run.rows, strict=True), life_or_reason(run, None)
     shares = None if life is None else 100.0 * life.worst.shares
     return view | {
-        "steps": [line | step_figures(run, row, inputs.units, shares) for line, row in rows],
+        "steps": [line | step_figures(run, row, units, shares) for line, row in rows],
         "notes": [headline(run, life), f"No life: {reason}" if life is None else life_conclusion(run, life)],
         "wrong": None,
         "worst": run.worst.number - 1,
@@ -68,7 +69,7 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
         "cycles": run.cycles,
         "repeated": run.repeated,
         "stop": run.stop,
-        "trace": trace_of(run, inputs.units),
+        "trace": trace_of(run, units),
     }
 
 

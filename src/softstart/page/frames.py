@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import secrets
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping
@@ -151,7 +152,13 @@ class FrameBuilder:
             "duty_step": self.duty_step,
             # the map is in SI on both sides of the wire; its axis and read-out are labelled in these units
             "here": inputs.machine.gap_and_inertia,
-            "angle": (units.of("rad"), units.size("rad")),
+            "angle": (units.of("rad"), 1.0 / units.shown(1.0, "rad")),
+            "inertia": 1.0 / units.shown(1.0, "kg*m^2"),
+            "torque": unit(units.of("N*m")),
+            "at": units.at,
+            "no_output": gear
+            if isinstance(gear := inputs.machine.gear or inputs.machine.gear_with(), str)
+            else "",
             "map_is_old": not self._map_is_right(),
         }
         parts = (("groups", self._machine), ("strategy", self._strategy), ("duty_fields", self._duty))
@@ -199,7 +206,7 @@ class FrameBuilder:
             value = default.get(name) if setting is None else setting
             marks = [("default", default.get(name)), *((of, getattr(gains, name)) for of, gains in tuned)]
             if value is not None and setting is None and entry.unit:
-                text = f"{units.shown(float(value), entry.unit):.4g}"
+                text = f"{entry.seen(units).shown(float(value), entry.unit):.4g}"
             else:
                 text = written_value(value, entry, units)
             fields[path] = field_view(entry, text, value, marks, units)
@@ -230,7 +237,9 @@ class FrameBuilder:
         inputs, result = self.session.inputs, self.session.reference()
         if inputs.reference is None or result is None:
             return None
-        line = outcomes(result) | {"name": ", ".join(filter(None, reference_words(inputs.reference, inputs)))}
+        line = outcomes(result, inputs.units) | {
+            "name": ", ".join(filter(None, reference_words(inputs.reference, inputs)))
+        }
         if self._is_new("reference", (inputs.reference, self.window, inputs.units)):
             line["trace"] = drawn(result, inputs.units, window=self.window)
         return line
@@ -369,7 +378,11 @@ def numbers(values: Vector) -> list[float | None]:
 def described(entry: FormField, units: Units) -> Frame:
     """A field as the browser builds it; `text` says that it takes words alone."""
     text = not (entry.unit or entry.choices or entry.path.startswith(STRATEGY))
-    return vars(entry) | {"unit": unit(units.of(entry.unit)), "scale": entry.scale is not None, "text": text}
+    return vars(entry) | {
+        "unit": unit(entry.seen(units).of(entry.unit)),
+        "scale": entry.scale is not None,
+        "text": text,
+    }
 
 
 def field_view(entry: FormField, text: str, value: Value, marks: Iterable[Mark], units: Units) -> Frame:
@@ -381,7 +394,7 @@ def field_view(entry: FormField, text: str, value: Value, marks: Iterable[Mark],
         "text": text,
         "position": scale.position(float(value) if isinstance(value, int | float) else 0.0),
         "marks": [
-            (scale.position(float(mark)), f"{of}: {written(float(mark), entry.unit, units)}")
+            (scale.position(float(mark)), f"{of}: {written(float(mark), entry.unit, entry.seen(units))}")
             for of, mark in marks
             if mark is not None
         ],
@@ -393,7 +406,7 @@ def written_value(value: Value, entry: FormField, units: Units) -> str:
     if value is None or isinstance(value, str):
         return value or ""
     parts = value if isinstance(value, tuple) else (value,)
-    return "; ".join(written(float(part), entry.unit, units) for part in parts)
+    return "; ".join(written(float(part), entry.unit, entry.seen(units)) for part in parts)
 
 
 def machine_fields(session: Session, entries: Mapping[str, FormField]) -> dict[str, Frame]:
@@ -412,7 +425,7 @@ def machine_fields(session: Session, entries: Mapping[str, FormField]) -> dict[s
         if " " in text and " " in typed:  # with a unit of its own, as it was typed: 36 arcmin or 0.6 deg
             text = typed
         if path == "units":
-            text = text or units.text  # as the machine was given
+            text = re.sub(r"(, *)?at [a-z ]+", "", text) or units.at_motor.text  # the shaft has a switch
         fields[path] = field_view(entry, text, value, [("as loaded", loaded)], units)
     return fields
 
@@ -423,17 +436,18 @@ def machine_fields(session: Session, entries: Mapping[str, FormField]) -> dict[s
 def figure_view(session: Session, result: Strategy) -> Frame:
     """The large figure and the numbers around it."""
     run, units, known = result.run, session.inputs.units, session.row(result.name)
-    facts = outcomes(result) | {
+    facts = outcomes(result, units) | {
         "settled_lost": None if known is None else json_number(known.settled_lost),
         "status": result.status,
-        "base": json_number(float(session.inputs.machine.mean_torque)),
+        "base": json_number(float(units.shown(float(session.inputs.machine.mean_torque), "N*m"))),
+        "torque_unit": unit(units.of("N*m")),
         "speed_unit": units.of("rad/s"),
     }
     if run is not None:
         facts |= {
             "reached": math.isfinite(run.limited_time),
             "overshoot": json_number(100.0 * run.overshoot),
-            "output_torque": json_number(run.peak_torque_at_output),
+            "output_torque": None if units.gear else json_number(run.peak_torque_at_output),
             "contacts": run.contacts,
             "impact_speed": json_number(units.shown(run.impact_speed, "rad/s")),
             "position": "".join(position_notes([run])),
@@ -441,13 +455,13 @@ def figure_view(session: Session, result: Strategy) -> Frame:
     return facts
 
 
-def outcomes(result: Strategy) -> Frame:
+def outcomes(result: Strategy, units: Units) -> Frame:
     """Figures of a start that need no other one."""
     return {
         "name": result.name,
         "k_dyn": json_number(result.k_dyn),
         "start_time": json_number(result.start_time),
-        "peak_torque": json_number(result.peak_torque),
+        "peak_torque": json_number(float(units.shown(result.peak_torque, "N*m"))),
     }
 
 
@@ -462,7 +476,7 @@ def row(session: Session, result: Strategy) -> Frame:
         result = Strategy(result.name, None if known is None else known.run, trouble)
     time = math.nan if result.run is None else result.run.limited_time
     duty = session.duty_k_dyn(result.name)
-    line = outcomes(result) | {"duty": None if duty is None else json_number(duty)}
+    line = outcomes(result, session.inputs.units) | {"duty": None if duty is None else json_number(duty)}
     line |= {"trouble": result.trouble or ("" if math.isfinite(time) else result.status)}
     if known is None:
         empty = dict.fromkeys(("worn", "soft", "settled", "settled_lost", "overshoot"))
@@ -508,7 +522,8 @@ def drawn(
 ) -> Frame | None:
     """A start as the browser draws it: channels in single precision, the peak; if `whole` shafts and bodies.
 
-    Speeds and angles are in these units; `turn` is how much of a rad/s one of the speeds is.
+    Torques, speeds and angles are in these units; `turn` is how much of a rad/s at the motor one of the
+    speeds is.
     """
     run = result.run
     if run is None:
@@ -516,13 +531,14 @@ def drawn(
     traces = traces_of(run, window)
     largest = f"T[{run.worst_shaft}]"
     channels = list(traces) if whole else ["t", largest]
-    of = {"w": "rad/s", "theta": "rad"}
+    of = {"w": "rad/s", "theta": "rad", "T": "N*m", "u": "N*m"}
     rows = [units.shown(traces[name], of.get(name.partition("[")[0], "")) for name in channels]
     peak = min(int(np.searchsorted(traces["t"], run.peak_time)), traces["t"].size - 1)
+    height = math.copysign(run.peak_torque, traces[largest][peak])
     picture: Frame = {
         "channels": channels,
         "data": b64encode(np.stack(rows).astype("<f4").tobytes()).decode("ascii"),
-        "peak": [run.peak_time, math.copysign(run.peak_torque, traces[largest][peak])],
+        "peak": [run.peak_time, float(units.shown(height, "N*m"))],
         "worst": run.worst_shaft,
     }
     if whole:
@@ -536,8 +552,14 @@ def drawn(
             "motor": machine.motor_index,
             "load": machine.load_index,
             "target": units.shown(machine.target_speed, "rad/s"),
-            "allowed": json_number(run.permissible_torque),
-            "units": {"angle": units.of("rad"), "speed": units.of("rad/s"), "turn": units.size("rad/s")},
+            "allowed": json_number(float(units.lossless.shown(run.permissible_torque, "N*m"))),
+            "units": {
+                "angle": units.of("rad"),
+                "speed": units.of("rad/s"),
+                "torque": unit(units.of("N*m")),
+                "turn": 1.0 / units.shown(1.0, "rad/s"),
+                "at": units.at,
+            },
         }
     return picture
 

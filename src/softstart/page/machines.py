@@ -20,6 +20,7 @@ from softstart.drive.data_sheet import UnknownStiffness
 from softstart.drive.machine import Machine, TwoMasses
 from softstart.errors import InputError
 from softstart.page.sentences import WORDS
+from softstart.quantities import Units
 from softstart.start.batch import prepared
 from softstart.tuning.ranges import ranges_of, tunable_parameters
 
@@ -110,7 +111,7 @@ class FormField:
     """One field of the page: what `--set` calls it, its group, what stands before it, its unit in SI.
 
     `choices` are all that it takes, `words` what it offers beside numbers. `optional`: an empty field takes
-    the value back. `scale` is that of its slider, if it has one.
+    the value back. `scale` is that of its slider, if it has one, `at_output` as `Parameter` has it.
     """
 
     path: str
@@ -124,6 +125,21 @@ class FormField:
     words: tuple[str, ...] = ()
     optional: bool = False
     scale: Scale | None = None
+    at_output: str = ""
+
+    def seen(self, units: Units) -> Units:
+        """The units in which this field is seen: at the output only what may be written there.
+
+        >>> fields = parameter_fields(Drive.load("crane-4amtkf"))
+        >>> from softstart.input.gear import Gear
+        >>> units = Units.read("rad, at output", gear=Gear(40.0, 0.8))
+        >>> for path in ("load.torque", "limits.shaft_torque", "motor.starting_torque"):
+        ...     print(fields[path].seen(units).shown(50.0, "N*m"))
+        1600.0
+        2000.0
+        50.0
+        """
+        return {"value": units, "limit": units.lossless}.get(self.at_output, units.at_motor)
 
 
 def parameter_fields(machine: Machine) -> Mapping[str, FormField]:
@@ -153,7 +169,7 @@ def parameter_fields(machine: Machine) -> Mapping[str, FormField]:
                 f"{symbol}{k if k and symbol else ''}".translate(BELOW), si,
                 f"{parameter.meaning}; write for example {', '.join([*words, example])}", example,
                 () if si else choices, words, parameter.default is None,
-                _scale(word, value, machine, model, k),
+                _scale(word, value, machine, model, k), parameter.at_output,
             )  # fmt: skip
     return entries
 

@@ -122,7 +122,8 @@ def changes(old: Machine, new: Machine) -> list[Change]:
 
 
 def _value(change: Change, units: Units) -> str:
-    value, si = change.old, change.parameter.unit
+    value, si, p = change.old, change.parameter.unit, change.parameter
+    units = {"value": units, "limit": units.lossless}.get(p.at_output, units.at_motor)
     if value is None or isinstance(value, str):
         return value or "not given"
     shown = unit(units.of(si))
@@ -138,7 +139,7 @@ def written(value: float, si: str, units: Units) -> str:
     >>> written(0.06981317007977318, "rad", Units("deg")), written(0.07, "rad", Units("deg"))
     ('4', '4.0107')
     """
-    if units.of(si) != si:
+    if units.of(si) != si or units.gear:
         return f"{units.shown(value, si):.6g}"
     text = shortest(value, si)
     return text if " " in text else f"{value:.6g}"

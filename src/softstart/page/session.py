@@ -138,7 +138,7 @@ class Inputs:
 
     @cached_property
     def units(self) -> Units:
-        """Those of angles and speeds: as the machine names them, else as its values had them when loaded.
+        """Units and shaft: as the machine names them, else as its values had them when loaded.
 
         A value that is typed in another unit changes them for no other field.
 
@@ -147,14 +147,13 @@ class Inputs:
         >>> session.inputs.units.angle, session.inputs.machine_in_units.units
         ('deg', 'deg, rpm')
         """
-        return units_of(self.machine, self.origin).at_motor
+        return units_of(self.machine, self.origin)
 
     @cached_property
     def machine_in_units(self) -> Machine:
         """The machine that names these units, for what is computed and written elsewhere, as reports."""
-        units = units_of(self.machine, self.origin)
-        same = units_of(self.machine) == units
-        return self.machine if same else with_typed_changes(self.machine, {"units": units.text})
+        same = units_of(self.machine) == self.units
+        return self.machine if same else with_typed_changes(self.machine, {"units": self.units.text})
 
     @cached_property
     def soft_drive(self) -> Drive | None:
@@ -336,6 +335,20 @@ class Session:
         controllers, label = self.inputs.controllers, self.inputs.selected
         controller = changed_controller(controllers[label], {name: value})
         self._change(gesture, controllers={**controllers, label: controller})
+
+    def show_at(self, output: bool) -> None:
+        """See values at the output of the gear, or at the motor shaft; InputError without a gear.
+
+        >>> session = Session()
+        >>> session.show_at(True)
+        Traceback (most recent call last):
+        softstart.errors.InputError: units = "rad, rpm, at output": without gear.ratio nothing ...
+        >>> session.set("gear.ratio", 38.0)
+        >>> session.show_at(True)
+        >>> session.inputs.units.text
+        'rad, rpm, at output'
+        """
+        self.set("units", self.inputs.units.at_motor.text + (", at output" if output else ""))
 
     def set_duty(self, plan: DutyPlan, gesture: str = "") -> None:
         """Another duty; also one whose steps cannot follow one another, which `duty_result` says.

@@ -251,6 +251,60 @@ def test_angles_and_speeds_are_in_the_units_of_the_user(machine, gap):
     assert 'write for example "deg, rpm, kN m, at output"' in frames.mistakes["units"]
 
 
+@pytest.mark.parametrize(("ratio", "eta"), [(38.0, 0.9), (1.7, 1.0), (0.5, 0.8)])
+def test_the_page_at_the_output_shows_and_takes_what_is_there(ratio, eta):
+    """Angles i times smaller, torques i eta larger, stiffness and inertia i^2 eta; limits without losses.
+
+    What belongs to the motor stays there, and K_dyn is the same; fields show six digits.
+    """
+    session = Session(controllers=["direct", "ramp"])
+    controls, frames = controls_of(session)
+    machine = session.inputs.machine
+    controls.take({"what": "show_at", "output": True})
+    assert 'without gear.ratio nothing is "at output"' in frames.mistakes[""]
+    for path, value in (("gear.ratio", ratio), ("gear.efficiency", eta), ("limits.shaft_torque", 90.0)):
+        session.set(path, value)
+    at_motor = frames.main_frame()
+    assert (at_motor["at"], at_motor["no_output"]) == ("", "")
+    controls.take({"what": "show_at", "output": True})
+    frame = frames.main_frame()
+    assert frame["at"] == ", at the output"
+    assert frame["fields"]["units"]["text"] == at_motor["fields"]["units"]["text"]  # the switch says it
+    factors = {
+        "shaft.gap": 1.0 / ratio, "start.target_speed": 1.0 / ratio, "load.torque": ratio * eta,
+        "shaft.stiffness": ratio**2 * eta, "load.inertia": ratio**2 * eta, "limits.shaft_torque": ratio,
+        "motor.starting_torque": 1.0, "motor.inertia": 1.0,
+    }  # fmt: skip
+    for path, factor in factors.items():
+        shown, before = (float(one["fields"][path]["text"]) for one in (frame, at_motor))
+        assert shown == pytest.approx(factor * before, rel=1e-5), path
+        loaded = session.inputs.machine.parameters_by_path()[path][1]
+        controls.take({"what": "edit", "path": path, "text": frame["fields"][path]["text"]})
+        assert session.inputs.machine.parameters_by_path()[path][1] == pytest.approx(loaded, rel=1e-5)
+        assert frames.mistakes == {}
+    controls.take({"what": "slide", "path": "load.torque", "position": 300})
+    shown = frames.main_frame()["fields"]["load.torque"]["text"]
+    assert len(shown.replace(".", "")) <= 5  # of a round number there
+    assert session.inputs.machine.load_torque == pytest.approx(float(shown) / (ratio * eta), rel=1e-9)
+    session.set("load.torque", machine.load_torque)
+    run = session.result("direct").run
+    (row,) = frames.main_frame()["rows"]
+    assert row["k_dyn"] == run.k_dyn
+    assert row["peak_torque"] == pytest.approx(run.peak_torque * ratio * eta, rel=1e-12)
+    trace = frames.main_frame()["traces"]["direct"]
+    assert trace["peak"][1] == pytest.approx(run.peak_torque * ratio * eta, rel=1e-12)
+    assert trace["allowed"] == pytest.approx(90.0 * ratio, rel=1e-5)
+    gap, inertia = frames.axes.gaps[3], frames.axes.inertias[3]
+    controls.take({"what": "jump", "gap": gap, "inertia": inertia})
+    assert session.inputs.machine.gap_and_inertia == pytest.approx((gap, inertia), rel=1e-5)
+    again = links.inputs_of(links.link_of(session.inputs), session.inputs)
+    assert again.units == session.inputs.units
+    controls.take({"what": "edit", "path": "units", "text": "arcmin, rpm, kN m"})
+    assert session.inputs.units.text == "arcmin, rpm, kN m, at output"
+    controls.take({"what": "show_at", "output": False})
+    assert session.inputs.units.text == "arcmin, rpm, kN m"
+
+
 class Reader:
     """Who reads the page: what the browser has of all frames so far, and what he takes a number for.
 

@@ -9,7 +9,8 @@ export default {
     <span class="drive-name"></span>
     <span class="steps" role="group" aria-label="Undo and redo"></span>
     <div class="units fields"></div>
-    <div class="theme" role="radiogroup" aria-label="Colours"></div>
+    <div class="theme shaft" role="radiogroup" aria-label="Values at the shaft of"></div>
+    <div class="theme colours" role="radiogroup" aria-label="Colours"></div>
   </header>
   <nav class="controls fields" aria-label="Parameters of the drive"></nav>
   <main class="centre">

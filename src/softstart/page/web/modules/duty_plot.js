@@ -171,7 +171,7 @@ export class DutyPlot {
     const { allowed } = trace;
     if (allowed && high > 0.5 * allowed) high = Math.max(high, 1.02 * allowed); // a limit far above says nothing
     if (allowed && low < -0.5 * allowed) low = Math.min(low, -1.02 * allowed);
-    this.frame(panel, [low, high], "Torque", "N m", [
+    this.frame(panel, [low, high], `Torque${this.view.at}`, "N m", [
       ...(beside.length ? [["other shafts", this.own, [], 0.8]] : []),
       ...(allowed ? [["permissible", warn, [], 1]] : []),
       ["motor u", ink, DASHED, 1.2],

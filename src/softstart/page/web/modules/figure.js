@@ -33,6 +33,7 @@ export class Figure {
       const [, value, unit] = this.facts[index].children;
       put(value, text(figure));
       if (label === "first impact") put(unit, figure.speed_unit);
+      if (/^(peak|mean)/.test(label)) put(unit, figure.torque_unit);
       if (label === "overshoot") this.facts[index].hidden = figure.overshoot == null; // of a torque strategy
       if (label === "at the output") this.facts[index].hidden = figure.output_torque == null; // where no gear is known
     });

@@ -7,6 +7,7 @@ import { element, put, stored } from "./numbers.js";
 import { Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Scheme } from "./scheme.js";
+import { Shaft } from "./shaft.js";
 import { Steps } from "./steps.js";
 import { Table } from "./table.js";
 import { Theme } from "./theme.js";
@@ -21,11 +22,12 @@ export class Instrument {
     const part = (name) => root.querySelector(`.${name}`);
     const say = (message) => this.say(message);
     [this.driveName, this.advice] = [part("drive-name"), part("advice")];
-    this.theme = new Theme(part("theme"), () => this.redraw());
+    this.theme = new Theme(part("colours"), () => this.redraw());
     this.scheme = new Scheme(part("controls"));
     this.remarks = part("controls").appendChild(element("div", { class: "remarks", role: "status" }));
     this.controls = new Controls(part("controls"), part("strategy"), part("units"), part("duty-fields"), say);
     this.steps = new Steps(part("steps"), say);
+    this.shaft = new Shaft(part("shaft"), say);
     this.figure = new Figure(part("figure"), say);
     this.table = new Table(part("strategies"), this.theme, say);
     const windowed = (window) => say({ what: "window", begin: window?.[0] ?? 0, end: window?.[1] ?? 0 });
@@ -75,11 +77,12 @@ export class Instrument {
     }
     if (order) {
       for (const known of [state.rows, state.traces]) for (const name of known.keys()) if (!order.includes(name)) known.delete(name);
-      const { shown, added, changed, selected, stamp, here, angle, at_time } = frame;
+      const { shown, added, changed, selected, stamp, here, angle, inertia, torque, at_time } = frame;
       const reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
-      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, fields, reference, at_time, soft: frame.soft });
+      Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, inertia, torque, fields, reference, at_time, soft: frame.soft });
       this.plotted = false;
       this.steps.show(frame.steps);
+      this.shaft.show(frame);
       this.controls.build(frame);
       this.controls.show(fields, mistakes, stamp);
       this.figure.tell(mistakes[""] ?? "");

@@ -160,7 +160,7 @@ export class GapMap {
     const { gaps, inertias, symbols } = this.head;
     const [unit, size] = this.state.angle;
     const other = this.against ? ` (${this.pinned.head.strategy}: ${fixed(this.against[row][column], 3)})` : "";
-    put(this.said, `${symbols[0]} ${significant(gaps[column] / size, 4)} ${unit}   ${symbols[1]} ${significant(inertias[row], 4)} kg m\u00b2   K ${fixed(this.rows[row]?.[column], 3)}${other}`);
+    put(this.said, `${symbols[0]} ${significant(gaps[column] / size, 4)} ${unit}   ${symbols[1]} ${significant(inertias[row] / this.state.inertia, 4)} kg m\u00b2   K ${fixed(this.rows[row]?.[column], 3)}${other}`);
   }
 
   walk(event) {
@@ -252,7 +252,7 @@ export class GapMap {
     for (const mark of marks) write(pen, label(mark, marks.digits), this.place(mark * size, inertias[0])[0], TOP + h + 14, quiet, "center");
     write(pen, `${labels[0]}, ${unit}`, LEFT + w / 2, TOP + h + 29, quiet, "center");
     const step = Math.max(1, Math.round(inertias.length / Math.max(2, h / 34)));
-    for (let row = 0; row < inertias.length; row += step) write(pen, significant(inertias[row], 3), LEFT - 6, this.place(gaps[0], inertias[row])[1], quiet, "right", "middle");
+    for (let row = 0; row < inertias.length; row += step) write(pen, significant(inertias[row] / this.state.inertia, 3), LEFT - 6, this.place(gaps[0], inertias[row])[1], quiet, "right", "middle");
     pen.save();
     pen.translate(10, TOP + h / 2);
     pen.rotate(-Math.PI / 2);

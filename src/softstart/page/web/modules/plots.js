@@ -306,7 +306,7 @@ export class Plots {
     for (const { trace } of others) [low, high] = extent(trace, "T", this.seen, low, high);
     const { allowed } = main;
     if (allowed && high > 0.5 * allowed) high = Math.max(high, 1.02 * allowed); // a limit far above says nothing
-    this.frame(panel, [low, high], "Torque", "N m", [
+    this.frame(panel, [low, high], `Torque${main.units.at}`, main.units.torque, [
       ...(many ? [["other shafts", own, [], 0.8]] : []),
       ...(this.reference ? [["reference", kept, [], WIDE]] : []),
       ...(allowed ? [["permissible", warn, [], 1]] : []),
@@ -409,7 +409,7 @@ export class Plots {
     const said = (name, trace, channel, unit = "") => `${name} ${significant(valueAt(trace, channel, t), 4)} ${unit}`.trim();
     const twists = main.shafts.flatMap(({ gap }, k) => (gap > 0 ? [said(`\u03b8${below(k + 1)}`, main, `theta[${k}]`)] : []));
     const heads = [
-      [`t ${significant(t, 4)} s`, said("T", main, "T", "N m"), said("u", main, "u", "N m")],
+      [`t ${significant(t, 4)} s`, said("T", main, "T", main.units.torque), said("u", main, "u", main.units.torque)],
       [said("\u03c9\u2081", main, "w1"), said("\u03c9\u2082", main, "w2", main.units.speed)],
       many ? twists : [said("\u03b8", main, "theta", main.units.angle)],
     ];
@@ -440,11 +440,11 @@ export class Plots {
   csv() {
     const { main, others, reference, many, state } = Object.assign(this, this.starts());
     const [from, to] = this.seen;
-    const { angle, speed } = main.units;
-    const [w, a] = [speed, angle].map((unit) => unit.replace("/", "_"));
-    const columns = [["t", "time_s"], ["T", "shaft_torque_Nm"], ["u", "motor_torque_Nm"], ["w1", `motor_speed_${w}`], ["w2", `load_speed_${w}`], ["theta", `twist_${a}`]];
+    const { angle, speed, torque, at } = main.units;
+    const [w, a, m] = [speed, angle, torque].map((unit) => unit.replace("/", "_").replaceAll(/\W/g, "") + (at && "_at_output"));
+    const columns = [["t", "time_s"], ["T", `shaft_torque_${m}`], ["u", `motor_torque_${m}`], ["w1", `motor_speed_${w}`], ["w2", `load_speed_${w}`], ["theta", `twist_${a}`]];
     if (many) {
-      main.shafts.forEach(({ name }, k) => columns.push([`T[${k}]`, quoted(`T ${name} [N m]`)], [`theta[${k}]`, quoted(`twist ${name} [${angle}]`)]));
+      main.shafts.forEach(({ name }, k) => columns.push([`T[${k}]`, quoted(`T ${name} [${torque}]`)], [`theta[${k}]`, quoted(`twist ${name} [${angle}]`)]));
       main.bodies.forEach((name, k) => columns.push([`w[${k}]`, quoted(`w ${name} [${speed}]`)]));
     }
     const lines = [["strategy", ...columns.map(([, head]) => head)].join(",")];

@@ -17,6 +17,7 @@ const COLUMNS = [
   ["set_to", "set to", "", (row) => row.set_to ?? "", "Value of the time parameter with the lowest K of those that settle within the equal time; figure and plots are of the strategy as it is set by its fields"],
 ];
 const FIGURES = COLUMNS.slice(1);
+const PEAK = COLUMNS.findIndex(([key]) => key === "peak_torque");
 const cells = () => FIGURES.map(([key]) => element("td", { class: "number", "data-key": key }));
 
 export class Table {
@@ -68,6 +69,7 @@ export class Table {
     this.arrange(state);
     this.switched(state);
     this.compare(state.reference);
+    put(this.heads[PEAK].firstChild, `peak, ${state.torque}`);
     this.body.parentNode.classList.toggle("ends", Boolean(state.soft));
     this.body.parentNode.classList.toggle("held", [...state.rows.values()].some((row) => row.overshoot != null));
     const largest = Math.max(2, ...[...state.rows.values()].map((row) => row.k_dyn ?? 0));
