@@ -57,6 +57,8 @@ from softstart.reporting.result import Report as Report
 from softstart.reporting.result import report as report
 from softstart.reporting.sheet import ParameterSheet as ParameterSheet
 from softstart.reporting.sheet import parameter_sheet as parameter_sheet
+from softstart.start.beside import SideBySide as SideBySide
+from softstart.start.beside import side_by_side as side_by_side
 from softstart.start.block import control_block as control_block
 from softstart.start.comparison import Comparison as Comparison
 from softstart.start.comparison import compare as compare

@@ -111,6 +111,15 @@ def known_from(text: str, where: str = "") -> Drive | Chain | UnknownStiffness:
     return Drive.from_toml(text, where=where)
 
 
+def refuse_other_kind(one: Machine, other: Machine, subject: str) -> None:
+    """InputError where a drive and a chain are to stand side by side; `subject` names the other one."""
+    if type(one) is not type(other):
+        raise InputError(
+            f'{subject} = "{other.name}": it is {other.WHAT} and "{one.name}" {one.WHAT}; machines of one '
+            "kind stand side by side, name another one."
+        )
+
+
 def machine_table(machine: MachineLike | MachineTable, **fields: object) -> MachineTable:
     """Many machines that differ in some values, for one call of `simulate`.
 

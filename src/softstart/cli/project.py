@@ -97,6 +97,8 @@ def _report(project: Project, progress: Any, typed: str, **steps: Any) -> Report
         start = simulate(project.single(), project.controller())
         refuse_longer(start, f'strategy "{chosen}"')
     controllers = [project.controller()] if chosen else None
+    beside = project.loaded(project.beside) if project.beside else None
     return report(
-        machine, controllers=controllers, command=typed, progress=progress, project=project, **steps
-    )
+        machine, controllers=controllers, command=typed, progress=progress, project=project, beside=beside,
+        **steps,
+    )  # fmt: skip

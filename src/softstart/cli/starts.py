@@ -6,14 +6,19 @@ import shlex
 from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
+import click
+
 import softstart
 from softstart.cli import options
+from softstart.cli.completion import one_of
 from softstart.cli.options import command, controller_option, option
 from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
+from softstart.errors import InputError
 from softstart.plugins import controller_names
 from softstart.quantities import whole_number
 
 if TYPE_CHECKING:
+    from softstart.controller import Controller
     from softstart.drive import Drive
     from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
@@ -28,21 +33,26 @@ if TYPE_CHECKING:
 @option("--worst-case", lambda text, name: () if text == "none" else options.read_list(text, name))
 @option("--at-time", is_flag=False, flag_value="1.3x")
 @option("--details", is_flag=True)
+@option("--worn-gap")
 @options.of_drive(options.read_machine_or_identified)
+@click.argument("beside", required=False, shell_complete=one_of(options.drive_names))
 @answers(out=True)
 def compare_command(
-    *, drive: Machine | Identification, controllers: list[str] | None, params: dict[str, str], details: bool,
-    **arguments: Any,
+    *, drive: Machine | Identification, beside: str | None, worn_gap: str | None,
+    controllers: list[str] | None, params: dict[str, str], details: bool, **arguments: Any,
 ) -> Output:  # fmt: skip
-    """Compare strategies on a drive or a chain.
+    """Compare strategies on a drive or a chain, or on two of them side by side.
 
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
     tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
     drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, or a
-    file of tuned gains.
+    file of tuned gains. BESIDE is another machine of the same kind: one table and one figure show both.
 
     Options
     -------
+    --worn-gap GAP
+        Side by side with DRIVE as it is when worn: with this gap, for example '2 rad', under strategies set
+        up for DRIVE. Of a chain all gaps together at the motor shaft.
     --worst-case A,B,...
         Changes of the drive under which its [limits] are checked too: gap x4, J2 x0.4, or none. Default:
         both.
@@ -55,6 +65,10 @@ def compare_command(
     --out DIR
         Write figures (SVG, PNG), traces and table (CSV) and report.md into this folder.
     """
+    if beside is not None or worn_gap is not None:
+        return _side_by_side(
+            drive, beside, controllers_from_options(controllers, params), worn_gap, arguments
+        )
     with working("starting the drive ..."), attributed():
         comparison = softstart.compare(drive, controllers_from_options(controllers, params), **arguments)
     from softstart.views.starts import comparison_sheet
@@ -64,6 +78,17 @@ def compare_command(
         rows.sort(key=lambda row: row.run.k_dyn)
     sheet = comparison_sheet(comparison, rows, details or option_value("out") is not None)
     return comparison.summary, replace(sheet, commands=_next_steps(comparison))
+
+
+def _side_by_side(
+    drive: Machine | Identification, beside: str | None, strategies: list[Controller], worn_gap: str | None,
+    arguments: dict[str, Any],
+) -> Output:  # fmt: skip
+    if arguments.pop("fitted_to") is not None:
+        raise InputError("--fitted-to: side by side strategies are set up for their machines; leave it out.")
+    other = None if beside is None else options.read_machine_or_identified(beside, ())
+    with working("starting both machines ..."), attributed(), options.named_as_options(second="BESIDE"):
+        return softstart.side_by_side(drive, other, strategies, worn_gap=worn_gap, **arguments)
 
 
 def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:

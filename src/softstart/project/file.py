@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-from softstart.chain.machines import MachineLike, as_machine, known_from
+from softstart.chain.machines import MachineLike, as_machine, known_from, refuse_other_kind
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import PARAMETERS, Duty, Machine
@@ -240,6 +240,7 @@ class Project(ParameterFile):
 
     def _names(self) -> Iterator[str]:
         """Sentences on names in the choice and in optima that nothing has."""
+        wrong = Mistakes()
         machines, duties = [one.name for one in self.machines], [one.name for one in self.duties]
         if self.duty and self.duty not in duties:
             yield f'[choice] duty = "{self.duty}": the project has no such duty; {_meant(self.duty, duties)}'
@@ -253,11 +254,9 @@ class Project(ParameterFile):
             yield f'[choice] strategy = "{self.strategy}": {reason}; {_meant(self.strategy, known)}'
         if self.machine in machines and self.beside in machines:
             one, other = self.single(self.machine), self.single(self.beside)
-            if type(one) is not type(other):
-                yield (
-                    f'[choice] beside = "{self.beside}": it is {other.WHAT} and "{self.machine}" {one.WHAT}; '
-                    "machines of one kind stand side by side, name another one."
-                )
+            with wrong.collect():
+                refuse_other_kind(one, other, "[choice] beside")
+        yield from wrong.sentences
 
     @property
     def strategy_names(self) -> list[str]:

@@ -25,7 +25,7 @@ from softstart.start.comparison import Comparison
 from softstart.start.recommendation import SLOW
 from softstart.start.resolution import rated_torque
 from softstart.vibration import natural_vibration
-from softstart.views import chains, drives, duties, starts, traces
+from softstart.views import beside, chains, drives, duties, starts, traces
 from softstart.views import fatigue as lives
 from softstart.views.drawing import COLOURS, SMALL, colour_scale, drawing, heat_map, panels, svg_of, verbatim
 from softstart.views.numbers import (
@@ -191,6 +191,7 @@ def document(report: Report) -> str:
     sections = {
         "recommendation": "Recommendation",
         "strategies": "The strategies compared",
+        "beside": "Two machines side by side" if report.beside else "",
         "traces": "Torques of each start",
         "shafts": "Torques of the shafts" if several else "",
         "drive": f"The {what}",
@@ -224,7 +225,7 @@ def document(report: Report) -> str:
         "number": itertools.count(1).__next__, "svg": svg, "scheme": scheme,
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
         "maps_figure": maps_figure, "starts": starts,
-        "chains": chains, "lives": lives, "duties": duties, "duty_steps": duty_steps,
+        "chains": chains, "beside": beside, "lives": lives, "duties": duties, "duty_steps": duty_steps,
         "output": "|#at the output, N m" if drive.gear else "",
         "strategies": strategies, "equal_time": equal_time,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,

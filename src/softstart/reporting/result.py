@@ -29,6 +29,7 @@ from softstart.reporting.choice import Choice, RobustnessMap, robustness
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
 from softstart.reporting.sheet import ParameterSheet, make_sheet
 from softstart.results import Result
+from softstart.start.beside import SideBySide, side_by_side
 from softstart.start.comparison import (
     AT_TIME,
     REFERENCE,
@@ -103,6 +104,8 @@ class Report(Result):
         Customer, author, revisions, sources of the data; see `Project`.
     equal_time : Comparison or None
         The strategies at equal time, 1.3 times that of direct, each with its time parameter set for it.
+    beside : SideBySide or None
+        The strategies on this machine and on another one.
 
     Examples
     --------
@@ -127,6 +130,7 @@ class Report(Result):
     provenance: dict[str, Any]
     project: Project = field(default_factory=Project)
     equal_time: Comparison | None = None
+    beside: SideBySide | None = None
 
     def __repr__(self) -> str:
         """One line that says which strategy came out."""
@@ -265,6 +269,7 @@ class Report(Result):
             "life_gain": self.life_gain,
             "duty": duties.summary() if isinstance(duties := self.duties, DutyComparison) else duties or None,
             "sheets": [sheet.summary() for sheet in self.sheets],
+            **({} if self.beside is None else {"beside": self.beside.second.summary()}),
             "equal_time": None if self.equal_time is None else self.equal_time.summary(),
             "provenance": self.provenance,
         }
@@ -291,6 +296,7 @@ def report(
     progress: Callable[[float, str], object] | None = None,
     command: str = "",
     project: Project | str | Path | None = None,
+    beside: Any = None,
 ) -> Report:
     """Compute everything that a customer asks about the start of a drive or a chain.
 
@@ -317,6 +323,8 @@ def report(
     project : Project, str or Path, optional
         A project, or its TOML file: customer, author, revisions, sources of the data, paper size and
         decimal sign.
+    beside : Drive, Chain, DataSheet, str or path, optional
+        Another machine of the same kind, which a section compares with this one.
 
     Returns
     -------
@@ -350,6 +358,7 @@ def report(
     steps = _checked_options(machine, budget, resolution, about)
     made = _named_controllers(controllers, parameters or {})
     show = progress or (lambda share, what: None)
+    both = None if beside is None else side_by_side(drive, beside, made)
     mapped = "load.inertia" in machine.parameters_by_path()  # what a map varies is a parameter of the file
     started: list[tuple[Controller, Row]] = []
     at_soft_end: list[Row] = []
@@ -402,7 +411,7 @@ def report(
     show(1.0, "done")
     return Report(
         machine, tuple(failed), curve, choice, tuple(sheets), steps, provenance(machine, command), about,
-        _at_equal_time(machine, as_they_are),
+        _at_equal_time(machine, as_they_are), both,
     )  # fmt: skip
 
 
