@@ -148,7 +148,7 @@ GRAVITY = 9.80665  # m/s^2
 MOST_DIGITS = 9  # of a number that a person may have written
 # Units that people write, in which a value has few digits where it has 17 in SI.
 TYPED = {
-    unit: tuple(name for name, of in ORDINARY if of == unit)
+    unit: tuple(name for name, of in ORDINARY if of == unit and name != "kN*m")  # which saves no digit
     for unit in ("rad", "rad/s", "N*m/rad", "N*m", "W")
 }
 
@@ -497,7 +497,7 @@ class Units(NamedTuple):
         >>> Units(torque="kN*m").label("N*m/rad"), Units().label("kg*m^2")
         ('kN m/rad', 'kg m2')
         """
-        return self.of(si).replace("*", " ").replace("^", "")
+        return "" if si == "1" else self.of(si).replace("*", " ").replace("^", "")
 
     def size(self, si: str) -> float:
         """How much of the SI unit one of these is."""
@@ -509,7 +509,7 @@ class Units(NamedTuple):
     def shown(self, value: Any, si: str) -> Any:
         """A value or an array in SI at the motor shaft as it is seen."""
         size = self.size(si)
-        if self._is_at_output(si):
+        if self.is_at_output(si):
             value = self.gear.to_output(value, si)
         return value if size == 1.0 else value / size
 
@@ -520,7 +520,7 @@ class Units(NamedTuple):
         True
         """
         number = parse(self.at_motor.typed(f"{self.shown(value, si):.{digits}g}", si), si)
-        return cast("float", self.gear.to_motor(number, si) if self._is_at_output(si) else number)
+        return cast("float", self.gear.to_motor(number, si) if self.is_at_output(si) else number)
 
     def typed(self, text: str, si: str) -> str:
         """What a number in such a field means, as a parameter reads it; any other text stays as it is.
@@ -528,7 +528,7 @@ class Units(NamedTuple):
         At the output a quantity with a unit of its own is there too.
         """
         text = without_powers(text)
-        if self._is_at_output(si) and _QUANTITY.fullmatch(text.strip()):
+        if self.is_at_output(si) and _QUANTITY.fullmatch(text.strip()):
             return f"{self.at_motor.typed(text, si).strip()} at output"
         if self.of(si) == si or not _NUMBER.fullmatch(text.strip()):
             return text
@@ -536,7 +536,8 @@ class Units(NamedTuple):
             return f"{float(text) * self.size(si):.{MOST_DIGITS}g}"
         return f"{text.strip()} {self.of(si)}"
 
-    def _is_at_output(self, si: str) -> bool:
+    def is_at_output(self, si: str) -> bool:
+        """Whether a quantity of this SI unit has another value at the shaft asked for."""
         return self.gear is not None and self.gear.factor(si) is not None
 
 
@@ -555,7 +556,8 @@ def _same_unit(written: str) -> dict[str, Any]:
     ({'torque': 'N*m'}, {'torque': 'kN*m'}, {'torque': 'lbf*ft'})
     """
     known = {
-        field: (si, *TYPED[si]) for field, si in (("angle", "rad"), ("speed", "rad/s"), ("torque", "N*m"))
+        field: (si, *(name for name, of in ORDINARY if of == si))
+        for field, si in (("angle", "rad"), ("speed", "rad/s"), ("torque", "N*m"))
     }
     for field, units in known.items():
         if written in units:

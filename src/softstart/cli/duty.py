@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 @option("--cycles", options.count(1, 100_000), default="2")
 @option("--slope", options.quantity("1"))
 @option("--estimate-damping", read_part_counts)
+@options.at_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def duty_command(

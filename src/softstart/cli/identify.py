@@ -72,11 +72,12 @@ def _columns(text: str, option: str) -> dict[str, str]:
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True)
 @option(
     "--drive",
-    lambda name, _: options.read_machine(name, options.typed_settings()),
+    lambda name, _: options.seen(options.read_machine(name, options.typed_settings())),
     required=True,
     shell_complete=one_of(options.drive_names),
 )
 @options.set_option(Drive.TABLES)
+@options.at_option
 @option("--columns", _columns)
 @option("--torque-is", type=click.Choice(["measured", "demand"]), default="measured")
 @free_option

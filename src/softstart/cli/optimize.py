@@ -95,6 +95,7 @@ def _no_solution() -> Iterator[None]:
 @option("--gaps", _each("rad"))
 @option("--inertias", _each("kg*m^2"))
 @option("--load-torques", _each("N*m"))
+@options.at_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def optimize_command(
@@ -168,6 +169,7 @@ def _runs_beside(best: Optimum) -> list[Run]:
 @option("--terminal", type=click.Choice(TERMINALS), default="reached")
 @option("--torque-speed", _corners)
 @options.controller_option("--controllers", several=True)
+@options.at_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def pareto_command(

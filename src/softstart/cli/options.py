@@ -4,6 +4,9 @@ Options that several commands have alike; the docstring of a command describes i
 
 --allow-code
     Allow a file of tuned gains to name a Python file, which is then executed.
+--at motor|output
+    Show torques, speeds, angles, stiffness and inertia at the motor shaft or at the output of the gear.
+    Default: as `units` of DRIVE says, else at the motor shaft. --json and CSV files are always at the motor.
 --controllers A,B,...
     Strategies, separated by commas. Default: all installed ones that need no parameter.
 --cycles N
@@ -45,6 +48,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
@@ -70,6 +74,7 @@ from softstart.input.parameter_set import read_settings
 from softstart.input.parameters import Wording
 from softstart.plugins import controller_names
 from softstart.quantities import RefusedError, to_si, values_in, whole_number
+from softstart.views.numbers import seen_at
 
 if TYPE_CHECKING:
     from softstart.identification.result import Identification
@@ -80,7 +85,7 @@ Reader = Callable[[Any, str], Any]
 
 DEFAULT_DRIVE = "crane-4amtkf"
 CODE, SETTINGS, TYPED = "softstart.allow_code", "softstart.settings", "softstart.typed"
-DUTY = "softstart.duty"
+DUTY, AT = "softstart.duty", "softstart.at"
 
 
 def drive_names() -> tuple[str, ...]:
@@ -383,6 +388,12 @@ def typed_settings(of_duty: bool = False) -> tuple[str, ...]:
     return tuple(one for one in texts if of_duty == bool(meta.get(DUTY) and OF_DUTY.match(one)))
 
 
+def typed_shaft() -> list[str]:
+    """--at and its shaft as typed, if it was."""
+    shaft = click.get_current_context().meta.get(AT)
+    return [] if shaft is None else ["--at", shaft]
+
+
 def typed_machine() -> str:
     """The argument for the machine as it was typed."""
     return str(click.get_current_context().meta[TYPED])
@@ -395,7 +406,7 @@ def machine_argument(
 
     def load(typed: str, _: str) -> object:
         click.get_current_context().meta[TYPED] = typed
-        return read(typed, typed_settings())
+        return seen(read(typed, typed_settings()))
 
     argument = click.argument(
         name,
@@ -452,6 +463,21 @@ allow_code_option = click.option(
 )  # fmt: skip
 
 
+def seen(found: Any) -> Any:
+    """A machine, or what holds one, that is seen at the shaft of --at."""
+    shaft = click.get_current_context().meta.get(AT)
+    if shaft is None:
+        return found
+    if isinstance(found, UnknownStiffness):
+        return UnknownStiffness(*map(seen, found))
+    if not isinstance(found, Machine):
+        return replace(found, drive=seen(found.drive))
+    try:
+        return seen_at(found, shaft)
+    except RefusedError as refusal:
+        raise InputError(f"--at {shaft}: {refusal.reason}.") from None
+
+
 def typed_duty(given: Machine | Identification | UnknownStiffness) -> Duty | bool | None:
     """The duty of --duty for this machine, with the changes of --set; True: its own, None: no --duty."""
     name = click.get_current_context().meta.get(DUTY)
@@ -467,6 +493,11 @@ def _read_fitted_to(name: str, option: str) -> Drive:
 
 until_option = option("--until", quantity("s", above=0.0))
 fitted_to_option = option("--fitted-to", _read_fitted_to, shell_complete=one_of(drive_names))
+# is_eager: the machine is loaded with it
+at_option = click.option(
+    "--at", type=click.Choice(["motor", "output"]), is_eager=True, expose_value=False,
+    callback=lambda context, _, shaft: context.meta.update({AT: shaft}),
+)  # fmt: skip
 json_option = option("--json as_json", is_flag=True)
 # is_eager: the machine is loaded without the changes of a duty in a file of its own
 duty_file_option = click.option(

@@ -40,6 +40,7 @@ PRINTING = 120.0  # s for a browser to print a report
 @option("--resolution")
 @option("--budget", options.quantity("s", least=0.0))
 @option("--project")
+@options.at_option
 @options.of_drive(options.read_machine_or_identified)
 @answers()
 def report_command(

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 @option("--at-time", is_flag=False, flag_value="1.3x")
 @option("--details", is_flag=True)
 @option("--worn-gap")
+@options.at_option
 @options.of_drive(options.read_machine_or_identified)
 @click.argument("beside", required=False, shell_complete=one_of(options.drive_names))
 @answers(out=True)
@@ -96,6 +97,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
     from softstart.tuning.ranges import tunable_parameters
 
     settings = [word for setting in options.typed_settings() for word in ("--set", setting)]
+    settings += options.typed_shaft()
     chosen = comparison.recommendation
     best = chosen.recommended or (chosen.best[-1] if chosen.best else None)
     steps: list[tuple[str, list[str], str]] = []
@@ -114,6 +116,7 @@ def _next_steps(comparison: Comparison) -> list[tuple[str, str]]:
 @options.param_option
 @options.fitted_to_option
 @options.until_option
+@options.at_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def simulate_command(
@@ -164,6 +167,7 @@ def read_part_counts(text: str, option: str) -> dict[str, int]:
 @option("--slope", options.quantity("1"))
 @option("--worn-gap")
 @option("--estimate-damping", read_part_counts)
+@options.at_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def fatigue_command(

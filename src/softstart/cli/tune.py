@@ -105,6 +105,7 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 @option("--restarts", options.count(0), default="3")
 @options.workers_option
 @options.scheduler_option
+@options.at_option
 @options.of_drive(options.read_machine_or_identified)
 @answers(out=True)
 def tune_command(

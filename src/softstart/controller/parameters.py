@@ -11,7 +11,7 @@ from typing import Any, Literal
 from softstart.drive import Drive
 from softstart.errors import InputError
 from softstart.input.parameters import LEAST, LIMITS, MOST, Limit, Parameter, Wording, read_value
-from softstart.quantities import RefusedError, show
+from softstart.quantities import RefusedError, Units, show
 
 Interval = tuple[float, float]
 Default = Callable[[Drive, "ParameterValues"], Any] | float | str | None
@@ -131,16 +131,16 @@ def _of_class(cls: type) -> Mapping[str, ControllerParameter]:
     return {f.name: replace(f.metadata.get("parameter", plain), key=f.name, name=f.name) for f in fields(cls)}
 
 
-def set_to_text(controller: object, setting: Mapping[str, float]) -> str:
-    """Values with their units, under the names by which they are given.
+def set_to_text(controller: object, setting: Mapping[str, float], units: Units) -> str:
+    """Values in these units, under the names of the parameters.
 
     >>> from softstart.controller import make_controller
-    >>> set_to_text(make_controller("ramp"), {"time": 0.134, "initial": 7.0})
+    >>> set_to_text(make_controller("ramp"), {"time": 0.134, "initial": 7.0}, Units())
     'time 0.134 s, initial 7 N m'
     """
-    units = {name: one.unit.replace("*", " ") for name, one in declared_parameters(controller).items()}
+    si = {name: one.unit for name, one in declared_parameters(controller).items()}
     return ", ".join(
-        f"{name} {value:g}{'' if units[name] in ('', '1') else ' ' + units[name]}"
+        f"{name} {units.shown(value, si[name]):g} {units.label(si[name])}".rstrip()
         for name, value in setting.items()
     )
 

@@ -62,8 +62,7 @@ def momentum_bound(problem: Problem) -> LowerBound:
         return LowerBound(0.0, "none", unknown[0])
     peak = max(P for P in each if not isinstance(P, str)) * (1.0 - ROUNDING)
     covers = (
-        f"every torque from {problem.lowest_torque:g} to {problem.highest_torque:g} N m over time, by "
-        "whatever controller, however often the gap closes"
+        f"every torque from {problem.torques} over time, by whatever controller, however often the gap closes"
     )
     return LowerBound(peak / problem.base_torque, "momentum", covers)
 

@@ -126,8 +126,7 @@ def dual_bounds(problem: Problem, k_dyn: float, *, cells: int = CELLS) -> tuple[
 
 def _covers(problem: Problem, machine: Drive, once: bool) -> str:
     """The class of starts in words."""
-    limits = f"{problem.lowest_torque:g} to {problem.highest_torque:g}"
-    every = f"every torque from {limits} N m over time, by whatever "
+    every = f"every torque from {problem.torques} over time, by whatever "
     if not once:
         return every + "controller, however often the gap closes"
     open_gap = machine.theta0 < 0.5 * machine.gap

@@ -37,6 +37,7 @@ from softstart.profile import TorqueProfile
 from softstart.start.recommendation import Margin, Row, checked_limits, unchecked_life
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
+from softstart.views.numbers import units_of
 
 WITHIN = 1e-5  # of the start time, and of a limit that is met
 TIGHT = 1e-5  # a bound within this share needs no other one
@@ -392,7 +393,11 @@ def _within_limits(problem: Problem) -> Optimum:
     timed = replace(problem, start_time=None, minimise="start_time", k_dyn=most)
     best, at_least, quicker = _shortest_within(timed)
     refused = next(
-        (Margin(one, quicker.peak, "") for one in limits.each if quicker and one.figure == "peak_torque"),
+        (
+            Margin(one, quicker.peak, "", units_of(problem.drive))
+            for one in limits.each
+            if quicker and one.figure == "peak_torque"
+        ),
         None,
     )
     if limits.life is not None:

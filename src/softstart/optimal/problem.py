@@ -16,6 +16,7 @@ from softstart.chain.machines import as_machine
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.quantities import read_multiple, time_above_0
+from softstart.views.numbers import units_of
 
 if TYPE_CHECKING:
     from softstart.start.run import Run
@@ -232,6 +233,13 @@ class Problem:
     def lowest_torque(self) -> float:
         """Smallest motor torque that all machines allow, N m: 0 unless the motor may brake."""
         return max(float(one.motor.minimum_torque) for one in self.machines)
+
+    @property
+    def torques(self) -> str:
+        """Smallest and largest motor torque as the machine is seen: "0 to 62 N m"."""
+        units = units_of(self.drive)
+        low, high = (units.shown(one, "N*m") for one in (self.lowest_torque, self.highest_torque))
+        return f"{low:g} to {high:g} {units.label('N*m')}"
 
     @property
     def highest_torque(self) -> float:

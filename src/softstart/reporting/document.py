@@ -301,7 +301,9 @@ def duty_steps(row: DutyRow) -> TextTable:
     run = row.run
     assert run is not None
     columns = [one for one in duties.step_columns(run, row.life) if one.heading not in LEFT_OUT]
-    return TextTable.of_data("Steps", columns, run.rows, bold=[run.worst.number - 1], keys=2)
+    return TextTable.of_data(
+        "Steps", columns, run.rows, units_of(run.drive), bold=[run.worst.number - 1], keys=2
+    )
 
 
 def functions(report: Report) -> list[tuple[str, str]]:

@@ -42,6 +42,7 @@ from softstart.start.recommendation import (
 from softstart.start.run import Run
 from softstart.start.setting import Judge, for_limits, over_time
 from softstart.start.simulation import DEFAULT_DRIVE, simulate
+from softstart.views.numbers import units_of
 
 REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
@@ -368,7 +369,7 @@ def row_at_time(
         return row if settled <= at else TooSlow(name, "", settled, "")
     if (setting := tried.best(at)) is None:
         value, settled = tried.quickest or ({}, math.nan)
-        return TooSlow(name, tried.name, settled, set_to_text(controller, value))
+        return TooSlow(name, tried.name, settled, set_to_text(controller, value, units_of(direct.drive)))
     return replace(start(replace(controller, **setting)), setting=setting)
 
 

@@ -29,6 +29,7 @@ from softstart.start.metrics import REFERENCE
 from softstart.start.recommendation import Margin
 from softstart.start.run import named_states, write_columns
 from softstart.start.trajectory import FIRST_ROWS
+from softstart.views.numbers import units_of
 
 KEPT_CYCLES = 2  # whose trace is kept
 PLOT_POINTS = 3000
@@ -262,9 +263,9 @@ class DutyRun(Result, view="duties.duty_sheet"):
             "used_torque": 100.0 * float(share.max()),
             "start_time": step.start_time,
         }
-        names = {"start_time": "settled time"} if self.regulated else {}
+        names, units = {"start_time": "settled time"} if self.regulated else {}, units_of(self.drive)
         return tuple(
-            Margin(replace(limit, name=names.get(limit.figure, limit.name)), figures[limit.figure], "")
+            Margin(replace(limit, name=names.get(limit.figure, limit.name)), figures[limit.figure], "", units)
             for limit in self.drive.limits.each
             if not math.isnan(figures.get(limit.figure, math.nan))
         )

@@ -18,9 +18,11 @@ from softstart.controller.base import Controller, Effort, effort_of, label_of
 from softstart.controller.parameters import set_to_text
 from softstart.drive import Limit, Limits, Machine
 from softstart.errors import Sentence
+from softstart.quantities import Units
 from softstart.results import OneLine
 from softstart.start.fatigue import undamped, worst_damage
 from softstart.start.run import Run
+from softstart.views.numbers import IN_SI, units_of
 
 SLOW: Final = 2.0  # times the time of `direct`
 HIGHER: Final = 1.001  # times the K_dyn of `direct`
@@ -70,12 +72,13 @@ class Margin:
     """A limit and the worst figure beside it; `case` says where that is, "" on the drive as it is.
 
     `figure` is that of the start; `value` is what the limit bounds: of a torque at the output the ratio times
-    the figure.
+    the figure. A sentence has them in `units`, a torque at the output without losses.
     """
 
     of: Limit
     figure: float
     case: str
+    units: Units = IN_SI
 
     @property
     def value(self) -> float:
@@ -96,6 +99,16 @@ class Margin:
     def limit(self) -> float:
         """What is permitted."""
         return float(self.of.most)
+
+    @property
+    def seen(self) -> tuple[str, float, float, str]:
+        """Name, value, limit and unit as a sentence has them."""
+        if self.unit != "N m":
+            return self.name, self.value, self.limit, self.unit
+        units = self.units.lossless if self.of.scale == 1.0 else self.units.at_motor  # it is there already
+        name = self.name.replace("shaft", "output") if units.gear else self.name
+        of_value, of_limit = (float(units.shown(one, "N*m")) for one in (self.value, self.limit))
+        return name, of_value, of_limit, units.label("N*m")
 
     @property
     def share(self) -> float:
@@ -125,14 +138,15 @@ class Margin:
     def __str__(self) -> str:
         """As "shaft torque 93.2 N m of 130 N m with gap x4 (margin 28.3 %)", "used life 109 times ..."."""
         case = f" with {self.case}" if self.case else ""
-        if math.isnan(self.value):
-            return f"no {self.name}{case}, as the load does not reach its speed"
+        name, value, limit, unit = self.seen
+        if math.isnan(value):
+            return f"no {name}{case}, as the load does not reach its speed"
         if self.share < -1.0:
-            return f"{self.name} {_times(self.share)} times what is permitted{case}"
+            return f"{name} {_times(self.share)} times what is permitted{case}"
         percent = 100.0 * self.share
         left = f"margin {percent:.3g} %" if self.kept else f"{-percent:.3g} % over"
         left = "at the limit" if 0.0 <= self.share < AT_THE_LIMIT else left
-        return f"{self.name} {self.value:.4g} {self.unit} of {self.limit:.4g} {self.unit}{case} ({left})"
+        return f"{name} {value:.4g} {unit} of {limit:.4g} {unit}{case} ({left})"
 
 
 def _times(share: float) -> str:
@@ -165,7 +179,7 @@ class Row(OneLine):
     @property
     def set_to(self) -> str:
         """The parameters that were set for this machine: "time 0.134 s"; "" for the strategy as it is."""
-        return set_to_text(self.controller, self.setting)
+        return set_to_text(self.controller, self.setting, units_of(self.run.drive))
 
     @property
     def controller(self) -> Controller:
@@ -222,7 +236,7 @@ class Row(OneLine):
             # of values that are equal but for rounding that of the machine as it is
             worst = max(values, key=lambda case: (math.isnan(values[case]), float(f"{values[case]:.12g}")))
             named = replace(limit, name=names.get(limit.figure, limit.name))
-            found.append(Margin(named, values[worst], worst))
+            found.append(Margin(named, values[worst], worst, units_of(self.run.drive)))
         return tuple(found)
 
     @property

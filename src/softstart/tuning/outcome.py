@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +30,7 @@ from softstart.input.files import write_whole
 from softstart.linear.view import loop_in_words
 from softstart.results import OneLine, Result
 from softstart.tuning.problem import TuningProblem, given_to
+from softstart.views.numbers import units_of
 
 if TYPE_CHECKING:
     import xarray
@@ -148,13 +149,18 @@ class Tuning(Result, view="tuning.tuning_sheet"):
         >>> tuned.plausibility_warnings[0][:75]
         'the gap of the drive, 0.5 rad, is outside the tuned range, 0.01 rad: the re'
         """
-        q, (gap, inertia) = self.problem, self.drive.gap_and_inertia
+        q, (gap, inertia), units = self.problem, self.drive.gap_and_inertia, units_of(self.drive)
+
+        def words(values: Iterable[float], si: str) -> str:
+            numbers = dict.fromkeys(f"{units.shown(value, si):.5g}" for value in values)
+            return f"{' to '.join(numbers)} {units.label(si)}"
+
         return [
-            f"the {name} of the drive, {value:.5g} {unit}, is outside the tuned range, "
-            f"{' to '.join(dict.fromkeys(f'{end:.5g}' for end in (axis[0], axis[-1])))} {unit}: the results "
+            f"the {name} of the drive, {words([value], si)}, is outside the tuned range, "
+            f"{words((axis[0], axis[-1]), si)}: the results "
             'do not apply to this drive. Values at the output of a gear are written "at output".'
-            for name, unit, value, axis in (
-                ("gap", "rad", gap, q.gaps), ("load inertia", "kg m2", inertia, q.load_inertias)
+            for name, si, value, axis in (
+                ("gap", "rad", gap, q.gaps), ("load inertia", "kg*m^2", inertia, q.load_inertias)
             )
             if not axis[0] * (1.0 - SAME) <= value <= axis[-1] * (1.0 + SAME)
         ]  # fmt: skip

@@ -14,7 +14,8 @@ from softstart.controller.base import Controller, label_of
 from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.errors import InputError, Mistakes
 from softstart.hints import nearest
-from softstart.quantities import number_in, read_multiple
+from softstart.quantities import Units, number_in, read_multiple
+from softstart.views.numbers import IN_SI
 
 WIDE = 10.0  # ends of a named range from which on it is searched in the logarithm
 
@@ -69,14 +70,14 @@ class Range:
         curved = self._curved(low)
         return np.where(curved, np.log(np.where(curved, values, 1.0)), values)
 
-    def text(self) -> str:
+    def text(self, units: Units = IN_SI) -> str:
         """The range in words."""
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
         parts = []
         if self.multiples is not None:
             parts.append(f"{self.multiples[0]:g} to {self.multiples[1]:g} times its default")
         if self.between is not None:
-            parts.append(f"{self.between[0]:g} to {self.between[1]:g}{unit}")
+            low, high = (units.shown(end, self.unit) for end in self.between)
+            parts.append(f"{low:g} to {high:g} {units.label(self.unit)}".rstrip())
         return ", within ".join(parts)
 
 

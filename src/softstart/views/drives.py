@@ -9,7 +9,7 @@ from typing import Any
 from softstart.chain.model import Chain
 from softstart.drive import INFORMATIVE_TABLES, Machine
 from softstart.quantities import Units
-from softstart.views.numbers import RPM, plural, printable, short
+from softstart.views.numbers import RPM, plural, printable, seen, short, units_of
 
 MOST = 6  # differences that are told
 POSITIONS = {
@@ -21,36 +21,39 @@ POSITIONS = {
 }
 LIMITS_OF_MOTOR = (
     ("torque lag", "torque_lag", "s"),
-    ("torque rate", "torque_rate", "N m/s"),
+    ("torque rate", "torque_rate", "N*m/s"),
     ("computing delay", "computing_delay", "s"),
-    ("noise of the measured torque", "torque_noise", "N m"),
+    ("noise of the measured torque", "torque_noise", "N*m"),
 )
 
 
 def drive_lines(machine: Any) -> list[str]:
     """The machine in a few lines: its name, the parameters that matter, and under which laws it starts."""
     two, masses, motor = machine.lever_rule_model, machine.mass_names, machine.motor
-    J1, J2, c, gap, Mc = (short(float(one)) for one in (two.J1, two.J2, two.c, two.gap, two.Mc))
+    units = units_of(machine)
+    J1, J2, c, gap, Mc = _values(two, units)
     named = f"  motor on {masses[machine.motor_index]}, load {masses[machine.load_index]}"
     if len(masses) == 2:
-        torque = "" if motor is None else f", starting torque Ms = {short(float(motor.starting_torque))} N m"
+        Ms = math.nan if motor is None else float(motor.starting_torque)
+        torque = "" if math.isnan(Ms) else f", starting torque Ms = {seen(Ms, 'N*m', units)}"
         parts = [
-            f"  motor  J1 = {J1} kg m2{torque}",
-            f"  shaft  c = {c} N m/rad, gap = {gap} rad, contact law {machine.contact_laws[0]}",
-            f"  load   J2 = {J2} kg m2, Mc = {Mc} N m, {two.kind}",
+            f"  motor  J1 = {J1}{torque}",
+            f"  shaft  c = {c}, gap = {gap}, contact law {machine.contact_laws[0]}",
+            f"  load   J2 = {J2}, Mc = {Mc}, {two.kind}",
             *([named] if masses != ("motor", "load") else []),
-            *_there(machine),
+            *_there(machine, units),
         ]
     else:
         count, inertia = int((machine.gaps > 0.0).sum()), float(machine.at_motor_shaft().moving_J.sum())
         parts = [
             f"  {len(masses)} masses, {plural(count, 'gap')}; at the motor shaft J = "
-            f"{short(inertia)} kg m2, gaps {short(float(machine.gaps.sum()))} rad, load torque {Mc} N m",
+            f"{short(inertia)} kg m2, gaps {seen(float(machine.gaps.sum()), 'rad', units)}, load torque {Mc}",
             named,
         ]
-    damping = f"d = {short(float(two.d))} N m s/rad" if len(masses) == 2 and two.d else ""
+    damping = f"d = {seen(float(two.d), 'N*m*s/rad', units)}" if len(masses) == 2 and two.d else ""
     also = ", ".join(filter(None, (damping, *_also(machine))))
-    start = f"  start  to {short(two.speed)} rad/s ({two.speed * RPM:.4g} rpm)"
+    speed = units._replace(speed="rad/s").shown(two.speed, "rad/s")
+    start = f"  start  to {short(speed)} rad/s ({speed * RPM:.4g} rpm)"
     lines = [
         printable(machine.name),
         *parts,
@@ -61,47 +64,54 @@ def drive_lines(machine: Any) -> list[str]:
     return list(filter(None, lines))
 
 
-def _there(machine: Machine) -> Iterator[str]:
-    """The same at the output of a gear."""
+VALUES = (("J1", "kg*m^2"), ("J2", "kg*m^2"), ("c", "N*m/rad"), ("gap", "rad"), ("Mc", "N*m"))
+
+
+def _values(two: Any, units: Units) -> list[str]:
+    """The values of two masses in these units."""
+    return [seen(float(getattr(two, name)), si, units) for name, si in VALUES]
+
+
+def _there(machine: Machine, units: Units) -> Iterator[str]:
+    """The same at the output of a gear; or, where everything is, through which gear."""
     if (gear := machine.gear) is not None:
-        two, places = (
-            machine.lever_rule_model,
-            (("c", "N*m/rad"), ("gap", "rad"), ("J2", "kg*m^2"), ("Mc", "N*m")),
-        )
-        c, gap, J2, Mc = (float(gear.to_output(getattr(two, name), si)) for name, si in places)
-        yield (
-            f"  output c = {short(c)} N m/rad, gap = {short(Units('arcmin').shown(gap, 'rad'))} arcmin, "
-            f"J2 = {short(J2)} kg m2, Mc = {short(Mc)} N m; "
-            f"i = {short(float(gear.ratio))}, eta = {short(float(gear.efficiency))}"
-        )
+        through = f"i = {short(float(gear.ratio))}, eta = {short(float(gear.efficiency))}"
+        _, J2, c, gap, Mc = _values(machine.lever_rule_model, units._replace(angle="arcmin", gear=gear))
+        if units.gear:
+            yield f"  output all values are at the output of the gear, {through}; limits without losses"
+        else:
+            yield f"  output c = {c}, gap = {gap}, J2 = {J2}, Mc = {Mc}; {through}"
 
 
 def _also(machine: Any) -> Iterator[str]:
     """What else decides the start, where it is not as by default."""
+    units = units_of(machine)
     motor, where = machine.motor, next(iter(machine.positions)) if len(machine.positions) == 1 else "unknown"
     friction, b1, b2 = map(float, machine.frictions)
     w1, w2 = float(machine.initial_motor_speed), float(machine.initial_load_speed)
     if where not in ("mid-gap", ""):
         yield f"starts {POSITIONS[where]}{', of all gaps alike' if len(machine.gaps) > 1 else ''}"
     elif where == "" and machine.theta0:
-        yield f"starts at twist {short(float(machine.theta0))} rad"
+        yield f"starts at twist {seen(float(machine.theta0), 'rad', units)}"
     if machine.brake == "motor" and machine.release_time > 0.0:
         proving = math.isinf(machine.release_time)
         until = "its torque has reached the shaft torque" if proving else f"{short(machine.release_time)} s"
         yield f"the brake holds the motor until {until}"
     if 0.0 < machine.brake_torque < math.inf:
-        yield f"the brake slips at {short(machine.brake_torque)} N m"
+        yield f"the brake slips at {seen(machine.brake_torque, 'N*m', units)}"
     if friction:
-        yield f"friction of the motor {short(friction)} N m"
+        yield f"friction of the motor {seen(friction, 'N*m', units)}"
     if b1 or b2:
-        yield f"viscous friction b1 = {short(b1)}, b2 = {short(b2)} N m s/rad"
-    for words, name, unit in LIMITS_OF_MOTOR if motor is not None else ():
+        first = short(float(units.shown(b1, "N*m*s/rad")))
+        yield f"viscous friction b1 = {first}, b2 = {seen(b2, 'N*m*s/rad', units)}"
+    for words, name, si in LIMITS_OF_MOTOR if motor is not None else ():
         value = float(getattr(motor, name))
         if value and math.isfinite(value):
-            yield f"{words} {short(value)} {unit}"
+            yield f"{words} {seen(value, si, units)}"
     yield from curves(machine)
     if w1 or w2:
-        yield f"initial speeds w1 = {short(w1)}, w2 = {short(w2)} rad/s"
+        first = short(float(units.shown(w1, "rad/s")))
+        yield f"initial speeds w1 = {first}, w2 = {seen(w2, 'rad/s', units)}"
 
 
 def curves(machine: Machine) -> Iterator[str]:

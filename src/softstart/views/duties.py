@@ -31,7 +31,17 @@ from softstart.views.drawing import (
 )
 from softstart.views.fatigue import SPECTRUM, estimated_damping, slope_sentence
 from softstart.views.markdown import file_stem
-from softstart.views.numbers import DataColumn, TextTable, number, plural, short, units_of, with_unit
+from softstart.views.numbers import (
+    DataColumn,
+    TextTable,
+    number,
+    plural,
+    seen,
+    short,
+    titled,
+    units_of,
+    with_unit,
+)
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 from softstart.views.starts import machine_lines, parameters_of
 from softstart.views.traces import shafts_of
@@ -42,8 +52,8 @@ if TYPE_CHECKING:
 
 # of the values of a step: unit in SI
 ASKED = {
-    "set_speed": "rad/s", "time": "s", "angle": "rad", "braking_torque": "N m", "brake_speed": "rad/s",
-    "brake_time": "s", "torque": "N m", "kind": "", "inertia": "kg m2", "friction": "N m", "mass": "",
+    "set_speed": "rad/s", "time": "s", "angle": "rad", "braking_torque": "N*m", "brake_speed": "rad/s",
+    "brake_time": "s", "torque": "N*m", "kind": "", "inertia": "kg*m^2", "friction": "N*m", "mass": "",
 }  # fmt: skip
 ANEW = "strategy, anew in the other direction"  # `StepRun.how`
 ROUNDING = 1e-9  # of the mean torque
@@ -68,13 +78,13 @@ def asked_of(step: DutyStep, machine: Machine) -> str:
     >>> asked_of(DutyStep("jog", time="200 ms", repeat=3), Drive.load("crane-4amtkf"))
     'jog 0.2 s, 3 times'
     """
-    units, given = units_of(machine).at_motor, step.given()
+    units, given = units_of(machine), step.given()
     parts = []
     for key, si in ASKED.items():
         if key not in given:
             continue
         value = given[key]
-        text = value if isinstance(value, str) else with_unit(float(units.shown(value, si)), units.of(si))
+        text = value if isinstance(value, str) else seen(value, si, units)
         name = "" if key in ("set_speed", "time", "angle") else key.replace("_", " ") + " "
         parts.append(f"{name}{text}")
     parts += [f"{step.repeat:g} times"] if step.repeat > 1.0 else []
@@ -91,14 +101,14 @@ def how_of(run: DutyRun, row: StepRun) -> str:
 def against_limits(margins: Sequence[Margin]) -> str:
     """The margin that decides, and to which limit."""
     least = min(margins, key=lambda one: one.share, default=None)
-    return "" if least is None else f"{least.brief}, {least.name}"
+    return "" if least is None else f"{least.brief}, {least.seen[0]}"
 
 
 def _least(margins: Sequence[Margin], what: str) -> Any:
     """The margin that decides in per cent, negative where the limit is exceeded, or the name of its limit."""
     least = min(margins, key=lambda one: one.share, default=None)
     if what == "name":
-        return "" if least is None else least.name
+        return "" if least is None else least.seen[0]
     return math.nan if least is None else 100.0 * least.share
 
 
@@ -119,15 +129,14 @@ def place_of(row: StepRun | None) -> str:
 
 def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
     """The columns of the table of steps."""
-    units = units_of(run.drive).at_motor
     shares = None if life is None else 100.0 * life.worst.shares
     return (
         DataColumn("step", lambda row: str(row.number)),
         DataColumn("to do", lambda row: asked_of(row.step, run.drive)),
         DataColumn("how", lambda row: how_of(run, row)),
         DataColumn("K_dyn", run.k_dyn_of, 3),
-        DataColumn("largest\ntorque N m", lambda row: _torque(run, row.largest.max())),
-        DataColumn("smallest\ntorque N m", lambda row: _torque(run, row.smallest.min())),
+        DataColumn("largest\ntorque N m", lambda row: _torque(run, row.largest.max()), si="N*m"),
+        DataColumn("smallest\ntorque N m", lambda row: _torque(run, row.smallest.min()), si="N*m"),
         DataColumn("margin\n%", lambda row: _least(run.margins_of(row), "share"), 1, optional=True),
         DataColumn("to the limit", lambda row: _least(run.margins_of(row), "name"), optional=True),
         DataColumn("damage\n%", lambda row: math.nan if shares is None else float(shares[row.number - 1]), 1,
@@ -138,7 +147,7 @@ def step_columns(run: DutyRun, life: DutyLife | None) -> tuple[DataColumn, ...]:
         DataColumn("time s", lambda row: row.time),
         DataColumn("settled\ns" if run.regulated else "start\ntime s", lambda row: row.start_time,
                    optional=True),
-        DataColumn(f"angle\n{units.of('rad')}", lambda row: float(units.shown(row.angle, "rad"))),
+        DataColumn("angle\nrad", lambda row: row.angle, si="rad"),
     )  # fmt: skip
 
 
@@ -147,12 +156,13 @@ def shaft_tables(run: DutyRun) -> list[TextTable]:
     names = run.drive.shaft_names
     if len(names) == 1:
         return []
-    peaks = np.array([row.peak_torques for row in run.rows])
+    units = units_of(run.drive)
+    peaks = np.array([units.shown(row.peak_torques, "N*m") for row in run.rows])
     columns = [DataColumn("shaft", lambda k: names[k])]
     columns += [DataColumn(name_of(row), lambda k, i=i: float(peaks[i, k])) for i, row in enumerate(run.rows)]  # type: ignore[misc]
-    used = 100.0 * peaks.max(axis=0) / run.drive.permissible_torques
+    used = 100.0 * peaks.max(axis=0) / units.shown(run.drive.permissible_torques, "N*m")
     columns.append(DataColumn("of the\npermissible %", lambda k: float(used[k]), 1, optional=True))
-    title = "Largest torque of each shaft at the motor shaft, N m"
+    title = f"Largest torque of each shaft at the motor shaft, {units.label('N*m')}"
     return [TextTable.of_data(title, columns, range(len(names)))]
 
 
@@ -170,7 +180,7 @@ def rough(value: float) -> str:
 
 LIFE = (
     DataColumn("shaft", lambda one: one.shaft),
-    DataColumn("equivalent\ntorque N m", lambda one: one.equivalent_torque),
+    DataColumn("equivalent\ntorque N m", lambda one: one.equivalent_torque, si="N*m"),
     DataColumn("cycles to\nfailure", lambda one: one.cycles, text=rough, optional=True),
     DataColumn("hours", lambda one: one.hours, text=rough, optional=True),
     DataColumn("shifts", lambda one: one.shifts, text=rough, optional=True),
@@ -178,9 +188,9 @@ LIFE = (
 )
 
 
-def life_table(life: DutyLife) -> TextTable:
+def life_table(life: DutyLife, machine: Machine) -> TextTable:
     """The lives of the shafts."""
-    return TextTable.of_data("Life", LIFE, life.shafts)
+    return TextTable.of_data("Life", LIFE, life.shafts, units_of(machine))
 
 
 def life_length(one: ShaftLife) -> str:
@@ -206,7 +216,7 @@ def life_conclusion(run: DutyRun, life: DutyLife) -> str:
     most = f"most damage in step {name_of(step)} ({100.0 * worst.shares[number - 1]:.3g} %)"
     length = life_length(worst)
     if not length:
-        torque = f"damage-equivalent torque {with_unit(float(f'{worst.equivalent_torque:.4g}'), 'N m')}"
+        torque = f"damage-equivalent torque {_in_words(worst.equivalent_torque, run.drive)}"
         return f"Life{where}: {torque}, {most}."
     used, required = life.margin(run.drive.limits), float(run.drive.limits.life or 0.0)
     reached = "" if used is None else "reached" if used.kept else "not reached"
@@ -249,10 +259,16 @@ def duty_lines(run: DutyRun) -> list[str]:
     return [f"  duty   {plural(steps, 'step')} a cycle{more}{rate}; {plural(run.cycles, 'cycle')} computed"]
 
 
+def _in_words(torque: float, machine: Machine) -> str:
+    """A torque in a sentence, four digits."""
+    units = units_of(machine)
+    return with_unit(float(f"{units.shown(torque, 'N*m'):.4g}"), units.label("N*m"))
+
+
 def headline(run: DutyRun, life: DutyLife | None = None) -> str:
     """The worst step, and whether the limits hold."""
     worst = run.worst
-    torque = with_unit(float(f"{worst.peak_torque:.4g}"), "N m")
+    torque = _in_words(worst.peak_torque, run.drive)
     text = f"Worst step: {name_of(worst)}, K_dyn {run.k_dyn:.3f} ({torque})."
     margins = run.margins(life)
     if not margins:
@@ -271,12 +287,12 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
     base = f'"{run.base.name}"' if run.base is not None else "this machine"
     yield (
         f"Figures of a step are the largest of {of} and of its repetitions, time and angle those with the "
-        f"largest torque. K_dyn: largest |T| over {run.base_torque:.4g} N m, the mean shaft torque of {base} "
-        "under full starting torque."
+        f"largest torque. K_dyn: largest |T| over {_in_words(run.base_torque, run.drive)}, the mean shaft "
+        f"torque of {base} under full starting torque."
     )
     if run.margins():
         yield "Margin: what a step leaves of the limit to which it comes nearest; negative: exceeded."
-    if run.drive.limits.output_torque is not None:
+    if run.drive.limits.output_torque is not None or units_of(run.drive).gear:
         yield "Limit of the output torque: shaft torque times the gear ratio, without losses, the safe side."
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
@@ -346,9 +362,9 @@ def idle_notes(runs: Sequence[DutyRun]) -> Iterator[str]:
                 if angle < IDLE * speed * (step.time or one.time):
                     key = (name_of(one), run.controller_name)
                     idle[key] = min(angle, idle.get(key, math.inf))
-    units = units_of(runs[0].drive).at_motor
+    units = units_of(runs[0].drive)
     shown = (
-        (place, f"{name} ({units.shown(angle, 'rad'):.3g} {units.of('rad')})")
+        (place, f"{name} ({units.shown(angle, 'rad'):.3g} {units.label('rad')})")
         for (place, name), angle in idle.items()
     )
     for place, names in grouped(shown).items():
@@ -363,11 +379,12 @@ def duty_facts(run: DutyRun) -> list[list[str]]:
     worst = run.worst
     names, gear = run.drive.shaft_names, run.drive.gear
     where = f" in {names[int(worst.peak_torques.argmax())]}" if len(names) > 1 else ""
-    output = "" if gear is None else with_unit(float(gear.to_output(worst.peak_torque, "N*m")), "N m")
+    units = units_of(run.drive)
+    there = seen(worst.peak_torque, "N*m", units._replace(gear=gear)) if gear and not units.gear else ""
     return [
         ["K_dyn", f"{number(run.k_dyn, 6)} in step {name_of(worst)}"],
-        ["peak shaft torque", f"{with_unit(worst.peak_torque, 'N m')}{where}"],
-        ["at the output, with losses", output],
+        ["peak shaft torque", f"{seen(worst.peak_torque, 'N*m', units)}{where}"],
+        ["at the output, with losses", there],
         ["time of a cycle", with_unit(run.cycle_time, "s")],
     ]
 
@@ -404,9 +421,11 @@ def duty_sheet(
         ],
         facts=duty_facts(run),
         tables=[
-            TextTable.of_data("Steps", columns, run.rows, bold=[run.worst.number - 1], keys=2),
+            TextTable.of_data(
+                "Steps", columns, run.rows, units_of(run.drive), bold=[run.worst.number - 1], keys=2
+            ),
             *shaft_tables(run),
-            *([] if life is None else [life_table(life)]),
+            *([] if life is None else [life_table(life, run.drive)]),
         ],
         conclusions=[headline(run, life), *([] if life is None else [life_conclusion(run, life)])],
         notes=[
@@ -474,7 +493,8 @@ def duty_figure(run: DutyRun, step: StepRun | None = None) -> Figure:
         axes[-1].set_xlabel("time, s")
         axes[-1].set_xlim(begin, end)
         of_step = "" if step is None else f", step {name_of(step)}"
-        entitle(figure, f"{run.drive.name}: duty under {run.controller_name}{of_step}")
+        title = f"{run.drive.name}: duty under {run.controller_name}{of_step}"
+        entitle(figure, titled(title, units_of(run.drive)))
     return figure
 
 
@@ -495,20 +515,22 @@ def worst_recorded(run: DutyRun) -> StepRun:
 
 def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
     """Motor and shaft torques, and the permissible ones."""
+    units = units_of(run.drive)
     t, traces = traces_between(run, begin, end)
-    axes.plot(t, traces["u"], color=COLOURS[1], lw=0.8, label="motor torque u")
+    axes.plot(t, units.shown(traces["u"], "N*m"), color=COLOURS[1], lw=0.8, label="motor torque u")
     for (name, line), torque in zip(shafts_of(run), traces["T"].T, strict=True):
-        axes.plot(t, torque, label=name, **(line | {"lw": 0.9}))
+        axes.plot(t, units.shown(torque, "N*m"), label=name, **(line | {"lw": 0.9}))
     permissible = float(run.drive.permissible_torques[int(run.worst.peak_torques.argmax())])
     if not math.isnan(permissible):
+        most = units.lossless.shown(permissible, "N*m")
         for sign, label in ((1.0, "permissible"), (-1.0, None)):
-            axes.axhline(sign * permissible, color=COLOURS[3], lw=1.0, ls=DASHES[1], label=label)
-    head(axes, f"K_dyn = {run.k_dyn:.3f} in step {name_of(run.worst)}", "torque, N m")
+            axes.axhline(sign * most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label=label)
+    head(axes, f"K_dyn = {run.k_dyn:.3f} in step {name_of(run.worst)}", f"torque, {units.label('N*m')}")
 
 
 def draw_speeds(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
     """The speeds of all masses."""
-    units, names = units_of(run.drive).at_motor, run.drive.mass_names
+    units, names = units_of(run.drive), run.drive.mass_names
     t, traces = traces_between(run, begin, end)
     lines = [(name, line_of(i)) for i, name in enumerate(names)]
     if len(lines) == 2:
@@ -593,8 +615,8 @@ def duty_comparison_sheet(
         tables=[TextTable.of_data("Worst of each step", columns, rows, bold=_best(rows), keys=1)],
         conclusions=comparison_conclusions(comparison),
         notes=[
-            f"K: largest |T| of a step over {runs[0].base_torque:.4g} N m, the mean shaft torque under full "
-            "starting torque; of all cycles and repetitions.",
+            f"K: largest |T| of a step over {_in_words(runs[0].base_torque, machine)}, the mean shaft torque "
+            "under full starting torque; of all cycles and repetitions.",
             *(f"{', '.join(names)}: {reason}" for reason, names in grouped(failed).items()),
             *stop_notes(runs),
             *starts_note(runs[0]),

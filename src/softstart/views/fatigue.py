@@ -13,7 +13,7 @@ from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
 from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
 from softstart.views.markdown import file_stem
-from softstart.views.numbers import DataColumn, TextTable, number, short
+from softstart.views.numbers import DataColumn, TextTable, number, seen, short, titled, units_of
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file, rows_file
 from softstart.views.starts import machine_lines
 
@@ -48,7 +48,7 @@ STRATEGY = DataColumn("strategy", lambda row: row.run.controller_name)
 FIGURES = (  # of a single shaft
     DataColumn("K_dyn", lambda row: row.start.k_dyn, 3),
     DataColumn("start\ntime s", lambda row: row.start.start_time),
-    DataColumn("equivalent\ntorque N m", lambda row: row.equivalent_torque),
+    DataColumn("equivalent\ntorque N m", lambda row: row.equivalent_torque, si="N*m"),
     DataColumn("life over\ndirect", lambda row: row.relative, text=factor),
     DataColumn("half\ndamping", lambda row: _end_of(row, 0), text=factor, optional=True),
     DataColumn("twice\ndamping", lambda row: _end_of(row, 1), text=factor, optional=True),
@@ -61,7 +61,8 @@ FIGURES = (  # of a single shaft
 )
 OF_SHAFTS = (  # a table each, with a column for each of several shafts
     DataColumn("Life over that under direct", lambda row: row.relative, text=factor),
-    DataColumn("Damage-equivalent torque at the motor shaft, N m", lambda row: row.equivalent_torque, 1),
+    DataColumn("Damage-equivalent torque at the motor shaft, N m", lambda row: row.equivalent_torque, 1,
+               si="N*m"),
     DataColumn("Life with half the damping", lambda row: _end_of(row, 0), text=factor, optional=True),
     DataColumn("Life with twice the damping", lambda row: _end_of(row, 1), text=factor, optional=True),
     DataColumn("Life over that under direct, worn", lambda row: row.worn_relative, text=factor,
@@ -78,9 +79,9 @@ def _end_of(row: Life, end: int) -> float:
 
 def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> list[TextTable]:
     """The strategies with all figures of a single shaft, or with a table a figure of several shafts."""
-    shafts = found.drive.shaft_names
+    shafts, units = found.drive.shaft_names, units_of(found.drive)
     if len(shafts) == 1:
-        return [TextTable.of_data(title, (STRATEGY, *FIGURES), rows)]
+        return [TextTable.of_data(title, (STRATEGY, *FIGURES), rows, units)]
     return [
         TextTable.of(
             figure.heading,
@@ -90,7 +91,7 @@ def fatigue_tables(found: Fatigue, rows: Sequence[Life], title: str = "") -> lis
             },
             ("strategy",),
         )
-        for figure in OF_SHAFTS
+        for figure in (one.seen(units) for one in OF_SHAFTS)
         if figure.is_shown(rows)
     ]
 
@@ -135,6 +136,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     """What the figures mean, and what they rest on."""
     drive, limits, curve = found.drive, found.drive.limits, found.curve
     worn, several = not math.isnan(found.worn_gap), len(drive.shaft_names) > 1
+    units = units_of(drive)
     ratio = f"{100.0 * drive.damping_ratio:.2g} %"
     damping = f"Damping ratio of the {'first natural vibration' if several else 'shaft'}: {ratio}."
     if found.estimate:
@@ -144,9 +146,10 @@ def fatigue_notes(found: Fatigue) -> list[str]:
     if worn:
         over = f"{limits.life / 3600.0 / HOURS_PER_YEAR:.3g} years" if limits.life else "the life"
         error = float(f"{100.0 * max(row.wear_error for row in found.rows):.1g}")
+        new = short(float(units.shown(float(drive.gaps.sum()), "rad")))
         text.append(
-            f"Worn: the backlash grows linearly from {short(float(drive.gaps.sum()))} to "
-            f"{short(found.worn_gap)} rad over {over}; integration error at most {error:g} %."
+            f"Worn: the backlash grows linearly from {new} to {seen(found.worn_gap, 'rad', units)} over "
+            f"{over}; integration error at most {error:g} %."
         )
     if limits.starts_per_hour is not None and curve.points:
         text.append(f"Years of 8766 h with {short(float(limits.starts_per_hour))} starts in each hour.")
@@ -171,7 +174,7 @@ def fatigue_notes(found: Fatigue) -> list[str]:
 def fatigue_figure(found: Fatigue) -> Figure:
     """Ranges of the cycles of a start over their number, of the most damaged shaft; lives of all shafts."""
     runs = sorted(found.by_run, key=lambda rows: -min(row.relative for row in rows))
-    names = [rows[0].run.controller_name for rows in runs]
+    names, units = [rows[0].run.controller_name for rows in runs], units_of(found.drive)
     with drawing():
         figure, (left, right) = new_figure(1, 2, (9.0, 1.9 + 0.28 * max(6, len(runs))))
         for index, (rows, name) in enumerate(zip(runs, names, strict=True)):
@@ -179,14 +182,15 @@ def fatigue_figure(found: Fatigue) -> Figure:
             spectrum = max(rows, key=lambda row: row.equivalent_torque).spectrum
             counts = np.concatenate([[0.5], np.cumsum(spectrum[:, 2])])
             ranges = np.concatenate([spectrum[:1, 0], spectrum[:, 0]])
-            left.step(counts, ranges, where="pre", label=name, **line)
+            left.step(counts, units.shown(ranges, "N*m"), where="pre", label=name, **line)
             lives = [row.relative for row in rows if math.isfinite(row.relative)]
             marker = MARKERS[index % len(MARKERS)]
             right.plot(lives, [index] * len(lives), marker, color=line["color"], ms=8)
         left.set_xscale("log")
         left.set_ylim(bottom=0.0)
         left.legend(fontsize=8)
-        head(left, "cycles of one start", "range of the shaft torque, N m", "cycles of at least this range")
+        up = f"range of the shaft torque, {units.label('N*m')}"
+        head(left, "cycles of one start", up, "cycles of at least this range")
         right.axvline(1.0, color=GREY, lw=0.8, ls=":")
         right.set_xscale("log")
         right.set_yticks(range(len(runs)), names)
@@ -195,7 +199,7 @@ def fatigue_figure(found: Fatigue) -> Figure:
         estimated = " (estimated)" if found.estimate else ""
         damping = f"damping ratio {100.0 * found.drive.damping_ratio:.2g} %{estimated}"
         head(right, f"{damping}{slope}", "", "life over that of direct")
-        entitle(figure, found.drive.name)
+        entitle(figure, titled(found.drive.name, units))
     return figure
 
 
@@ -213,7 +217,7 @@ def fatigue_sheet(found: Fatigue, rows: Sequence[Life] = (), fitted_to: Machine 
     left_out = {"spectrum", "relative_life_range"}
     records = [{k: v for k, v in row.summary().items() if k not in left_out} for row in found.rows]
     return Sheet(
-        f"{found.drive.name}: life of the shaft line",
+        titled(f"{found.drive.name}: life of the shaft line", units_of(found.drive)),
         machine_lines(found.drive, fitted_to),
         tables=fatigue_tables(found, rows or found.rows),
         conclusions=[fatigue_conclusion(found)],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,19 +15,21 @@ from softstart.drive import PARAMETERS
 from softstart.identification.model import FILTER
 from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
+from softstart.quantities import Units
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, TextTable, number, short
+from softstart.views.numbers import NOTHING, TextTable, number, seen, short, titled, units_of
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from softstart.drive import Machine
     from softstart.identification.planning import Experiment, ExperimentPlan
     from softstart.identification.result import Estimate, Identification
     from softstart.identification.wear import Wear
 
 UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
-FIGURES = {"peak shaft torque, N m": "peak", "load moves, rad": "travel", "lasts, s": "end"}
+FIGURES = {"peak": ("peak shaft torque", "N*m"), "travel": ("load moves", "rad"), "end": ("lasts", "s")}
 SIMULATED = "simulated, not measured: the torque demand, and the motor as its encoder would count it"
 
 
@@ -47,22 +50,31 @@ def _lines(found: Identification) -> list[str]:
         f"  {sum(one.time.size for one in found.logs)} samples of torque and {kinds}; "
         f"{known if found.stated else 'best fit, no intervals'}",
         f"  {found.agreed} of {found.searches} searches ended at the best minimum; torque error "
-        f"{found.ripple:.3g} N m in each sample",
+        f"{_torque(found.ripple, found.drive)} in each sample",
     ]
+
+
+def _torque(error: float, machine: Machine) -> str:
+    """A torque error, three digits."""
+    units = units_of(machine)
+    return f"{units.shown(error, 'N*m'):.3g} {units.label('N*m')}"
 
 
 def estimates_table(found: Identification) -> TextTable:
     """A row for each parameter: guess, value, interval."""
+    units = units_of(found.drive)
 
     def row(one: Estimate) -> list[str]:
         shared = one.name in UNITS
         words = one.name.replace("position", "position in gap, log").replace("_", " ")
         name, unit = UNITS[one.name] if shared else (words, "s" if one.name == FILTER else "1")
         unknown = AT_LIMIT if one.reason == AT_LIMIT else "unknown"
+        guess = short(float(units.shown(getattr(found.guess, one.name), unit))) if shared else NOTHING
+        one = _in_units(one, unit, units)
         return [
             name,
-            unit,
-            short(float(getattr(found.guess, one.name))) if shared else NOTHING,
+            units.of(unit),
+            guess,
             _digits(one.value, one) if one.known or math.isnan(one.upper) else unknown,
             number(100.0 * one.half_width, 2) if one.known and one.value and shared else NOTHING,
             _digits(one.lower, one),
@@ -71,7 +83,15 @@ def estimates_table(found: Identification) -> TextTable:
 
     title = "Estimates with 95 % intervals" if found.stated else "Best fit, no intervals"
     numbers = ("guess", "estimate", "+- %", "from", "to")
-    return TextTable.of_rows(title, ("parameter", "unit"), numbers, list(map(row, found.estimates)))
+    return TextTable.of_rows(
+        titled(title, units), ("parameter", "unit"), numbers, list(map(row, found.estimates))
+    )
+
+
+def _in_units(one: Estimate, si: str, units: Units) -> Estimate:
+    """The estimate as it is seen."""
+    value, lower, upper = (float(units.shown(each, si)) for each in (one.value, one.lower, one.upper))
+    return replace(one, value=value, lower=lower, upper=upper)
 
 
 def _digits(value: float, one: Estimate) -> str:
@@ -113,36 +133,42 @@ def identification_sheet(
 
 def identification_figure(found: Identification) -> Figure:
     """Each log beside the start of the drive found, and the residuals."""
-    count = len(found.logs)
+    count, units = len(found.logs), units_of(found.drive)
     with drawing():
         made, axes = new_figure(3, count, (4.5 + 3.5 * count, 6.0), squeeze=False, sharex="col")
-        entitle(made, f"{found.drive.name}: logs and simulated starts")
+        entitle(made, titled(f"{found.drive.name}: logs and simulated starts", units))
         for i, (log, left) in enumerate(zip(found.logs, found.residuals, strict=True)):
-            seen, unit = np.isfinite(log.values), "rad" if log.kind == "angle" else "rad/s"
+            known, si = np.isfinite(log.values), "rad" if log.kind == "angle" else "rad/s"
+            values, off, unit = units.shown(log.values, si), units.shown(left, si), units.label(si)
             time, steps = log.time - log.time[0], "steps-post" if log.torque_is == "demand" else "default"
             torque, motion, rest = axes[:, i]
-            head(torque, log.name, "torque, N m")
-            torque.plot(time, log.torque, color=COLOURS[0], drawstyle=steps)
+            head(torque, log.name, f"torque, {units.label('N*m')}")
+            torque.plot(time, units.shown(log.torque, "N*m"), color=COLOURS[0], drawstyle=steps)
             head(motion, "", f"{log.kind}, {unit}")
-            motion.plot(time[seen], log.values[seen], ".", ms=2.5, color=GREY, label="log")
-            motion.plot(time[seen], log.values[seen] + left, color=COLOURS[1], lw=1.0, label="model")
+            motion.plot(time[known], values[known], ".", ms=2.5, color=GREY, label="log")
+            motion.plot(time[known], values[known] + off, color=COLOURS[1], lw=1.0, label="model")
             motion.legend(loc="best")
             head(rest, "", f"drive - log, {unit}", "time, s")
-            rest.plot(time[seen], left, color=COLOURS[2], lw=0.8)
+            rest.plot(time[known], off, color=COLOURS[2], lw=0.8)
             rest.axhline(0.0, color=GREY, lw=0.6)
     return made
 
 
 def plan_table(plan: ExperimentPlan) -> TextTable:
     """Half an interval of 95 % of each parameter, in %, under each experiment."""
-    shown = plan.experiments
+    shown, units = plan.experiments, units_of(plan.drive)
     rows = [
         [UNITS[name][0], *(f"{100.0 * one.widths[name]:.2g}".replace("inf", "unknown") for one in shown)]
         for name in shown[0].widths
     ]
-    rows += [[heading, *(f"{getattr(one, name):.3g}" for one in shown)] for heading, name in FIGURES.items()]
+    rows += [
+        [f"{words}, {units.label(si)}", *(f"{units.shown(getattr(one, name), si):.3g}" for one in shown)]
+        for name, (words, si) in FIGURES.items()
+    ]
     names = [one.name.replace(", ", ",\n") for one in shown]
-    return TextTable.of_rows("Half intervals of 95 %, in % of the value", ("parameter",), names, rows)
+    return TextTable.of_rows(
+        titled("Half intervals of 95 %, in % of the value", units), ("parameter",), names, rows
+    )
 
 
 def plan_sheet(plan: ExperimentPlan) -> Sheet:
@@ -162,7 +188,7 @@ def plan_sheet(plan: ExperimentPlan) -> Sheet:
         [
             title,
             f"  a sample each {1e3 * plan.log_period:g} ms, {encoder}, a torque error of "
-            f"{plan.ripple:.3g} N m in each",
+            f"{_torque(plan.ripple, plan.drive)} in each",
         ],
         tables=[table],
         conclusions=[
@@ -184,31 +210,35 @@ def _write_log(plan: ExperimentPlan, one: Experiment, path: Path) -> None:
 
 def plan_figure(plan: ExperimentPlan) -> Figure:
     """The torque of each experiment."""
-    count = len(plan.experiments)
+    count, units = len(plan.experiments), units_of(plan.drive)
     with drawing():
         made, axes = new_figure(count, 1, (7.0, 1.3 * count + 1.0), sharex=True, squeeze=False)
-        entitle(made, f"{plan.drive.name}: torque demand of each experiment")
+        entitle(made, titled(f"{plan.drive.name}: torque demand of each experiment", units))
         for axis, one, colour in zip(axes[:, 0], plan.experiments, COLOURS, strict=False):
             time = np.linspace(0.0, one.end, 1000)
-            axis.plot(time, one.profile.at(time), color=colour)
+            axis.plot(time, units.shown(one.profile.at(time), "N*m"), color=colour)
             axis.axhline(0.0, color=GREY, lw=0.6)
-            head(axis, one.name, "N m")
+            head(axis, one.name, units.label("N*m"))
         axes[-1, 0].set_xlabel("time, s")
     return made
 
 
 def wear_conclusion(wear: Wear) -> list[str]:
     """How fast the gap grows, and when it reaches its limit."""
-    growth, lower, upper = wear.line.growth
-    said = [f"Growth of the gap: {growth:.3g} rad a year ({lower:.3g} to {upper:.3g})."]
+    units = units_of(wear.found[-1].drive)
+    growth, lower, upper = units.shown(np.array(wear.line.growth), "rad")
+    said = [
+        f"Growth of the gap{units.at}: {growth:.3g} {units.label('rad')} a year ({lower:.3g} to {upper:.3g})."
+    ]
     if wear.limit is None or wear.worn is None:
         return said
     reached, earliest, latest = wear.worn
     if math.isinf(wear.line.reaches(wear.limit)[1]):
-        said.append(f"It does not reach {short(wear.limit)} rad: it does not grow.")
+        said.append(f"It does not reach {seen(wear.limit, 'rad', units)}: it does not grow.")
     else:
         said.append(
-            f"It reaches {short(wear.limit)} rad {f'on {reached}' if reached else 'not on this line'}; the "
+            f"It reaches {seen(wear.limit, 'rad', units)} "
+            f"{f'on {reached}' if reached else 'not on this line'}; the "
             f"interval of 95 % goes from {earliest or 'before any of these dates'} to "
             f"{latest or 'never, as the growth may be none'}, if wear goes on as it has."
         )
@@ -217,14 +247,15 @@ def wear_conclusion(wear: Wear) -> list[str]:
 
 def wear_sheet(wear: Wear) -> Sheet:
     """What is shown of wear."""
-    drive = wear.found[-1].drive
+    drive, units = wear.found[-1].drive, units_of(wear.found[-1].drive)
+
     gaps = [
         [str(day), name, *(_digits(value, one) for value in (one.value, one.lower, one.upper))]
-        for day, name, one in zip(wear.dates, wear.names, wear.gaps, strict=True)
+        for day, name, gap in zip(wear.dates, wear.names, wear.gaps, strict=True)
+        for one in (_in_units(gap, "rad", units),)
     ]
-    table = TextTable.of_rows(
-        "Gap, with intervals of 95 %", ("date", "identification"), ("gap rad", "from", "to"), gaps
-    )
+    title, heading = titled("Gap, with intervals of 95 %", units), f"gap {units.label('rad')}"
+    table = TextTable.of_rows(title, ("date", "identification"), (heading, "from", "to"), gaps)
     return Sheet(
         f"{drive.name}: wear of the gap",
         [f"{drive.name}: wear from {wear.dates[0]} to {wear.dates[-1]}"],
@@ -239,6 +270,7 @@ def wear_sheet(wear: Wear) -> Sheet:
 
 def wear_figure(wear: Wear) -> Figure:
     """The gaps over time, the line with its interval, and the limit."""
+    units = units_of(wear.found[-1].drive)
     years = [(one - wear.dates[0]).days / YEAR for one in wear.dates]
     reached = wear.line.reaches(wear.limit)[0] if wear.limit else 0.0
     end = np.nanmax([1.3 * years[-1], min(reached, 4.0 * years[-1])])
@@ -246,15 +278,16 @@ def wear_figure(wear: Wear) -> Figure:
         made, axes = new_figure(1, 1, (7.0, 4.0))
         entitle(made, f"{wear.found[-1].drive.name}: wear")
         time = np.linspace(0.0, end, 200)
-        line, half = wear.line.at(time)
+        line, half = (units.shown(one, "rad") for one in wear.line.at(time))
         axes.fill_between(time, line - half, line + half, color=COLOURS[0], alpha=0.2, lw=0.0)
         axes.plot(time, line, color=COLOURS[0], label="line, interval of 95 %")
-        values = [one.value for one in wear.gaps]
-        reach = np.array([(one.value - one.lower, one.upper - one.value) for one in wear.gaps]).T
+        gaps = [_in_units(one, "rad", units) for one in wear.gaps]
+        values = [one.value for one in gaps]
+        reach = np.array([(one.value - one.lower, one.upper - one.value) for one in gaps]).T
         axes.errorbar(years, values, reach, fmt="o", ms=5, capsize=3, color=COLOURS[1], label="identified")
         if wear.limit is not None:
-            axes.axhline(wear.limit, color=GREY, ls="--", lw=1.0, label="limit")
-        head(axes, "", "gap, rad", f"years after {wear.dates[0]}")
+            axes.axhline(units.shown(wear.limit, "rad"), color=GREY, ls="--", lw=1.0, label="limit")
+        head(axes, "", f"gap{units.at}, {units.label('rad')}", f"years after {wear.dates[0]}")
         axes.set_ylim(bottom=0.0)
         axes.legend(loc="best")
     return made

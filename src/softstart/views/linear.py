@@ -14,7 +14,7 @@ from softstart.linear.plant import plant_scales
 from softstart.linear.systems import frequencies
 from softstart.linear.view import LinearView, margin_texts
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, DataColumn, TextTable
+from softstart.views.numbers import NOTHING, DataColumn, TextTable, seen_at
 from softstart.views.sheet import Sheet, rows_file
 from softstart.views.starts import machine_lines
 
@@ -123,7 +123,7 @@ def linear_sheet(view: LinearView) -> Sheet:
     """What is shown of a linear view; its conclusion alone where there is no loop."""
     loop = view.loop
     title = f"{view.drive.name}: loop of {view.name}"
-    lines = [*machine_lines(view.drive), f"  under  {view.name}"]
+    lines = [*machine_lines(seen_at(view.drive, "motor")), f"  under  {view.name}"]
     if loop is None:
         why = f'controller = "{view.name}": {view.notes[0]}'
         return Sheet(title, lines, view.notes[0], machine=view.drive, no_figure=why)

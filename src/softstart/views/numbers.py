@@ -11,16 +11,20 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from softstart.drive import Machine
-from softstart.quantities import Units
+from softstart.drive import Drive, Machine
+from softstart.input.parameters import Parameter
+from softstart.quantities import RefusedError, Units
 
 NOTHING, DASH = "-", "\N{EN DASH}"  # for a missing value
+IN_SI = Units()
 MISSING = ("", "nan", "None")  # texts of values that are not there
 RPM = 30.0 / math.pi  # of one rad/s
 LONGEST_NAME = 60  # characters of a name in a sentence
 UNITS = {"kg*m^2": "kg m\N{SUPERSCRIPT TWO}", "1": ""}  # as report and page print them
 MINUS = re.compile(r"(?<!\w)-(?=[\d.]|inf\b)|(?<=\de)-(?=\d)")  # a sign, not the hyphen of a name
-UNIT_BEHIND = r"(?<!,) (?=(N m|N m s|kg m2|rad|rad/s|s|ms|Hz|J|%|deg|mm|N|kN)$)"  # a heading
+UNIT_BEHIND = (  # a heading
+    r"(?<!,) (?=(k?N m|lbf ft|N m s|kg m2|rad|rad/s|rpm|s|ms|Hz|J|%|deg|arcmin|mm|N|kN)$)"
+)
 
 
 class Column(NamedTuple):
@@ -48,7 +52,7 @@ class DataColumn(NamedTuple):
 
     A number has so many `decimals`, or is written by `text`, or all of the column have as many decimals as
     the largest one has with `digits` significant ones. An `optional` column is left out where no row has a
-    value.
+    value. With `si`, the unit of the values in SI, with which the heading ends, it is shown in other units.
     """
 
     heading: str
@@ -57,6 +61,24 @@ class DataColumn(NamedTuple):
     digits: int = 4
     text: Callable[[float], str] | None = None
     optional: bool = False
+    si: str = ""
+
+    def seen(self, units: Units) -> DataColumn:
+        r"""The column in these units.
+
+        >>> DataColumn("peak\nN m", lambda row: 1500.0, si="N*m").seen(Units(torque="kN*m")).heading
+        'peak\nkN m'
+        """
+        if not self.si:
+            return self
+        heading = self.heading.removesuffix(Units().label(self.si)) + units.label(self.si)
+        decimals = self.decimals if units.of(self.si) == self.si else None
+
+        def of(row: Any) -> Any:
+            value = self.of(row)
+            return None if value is None else units.shown(value, self.si)
+
+        return self._replace(heading=heading, of=of, decimals=decimals)
 
     def is_shown(self, rows: Iterable[object]) -> bool:
         """Whether there is anything to show."""
@@ -97,15 +119,18 @@ class TextTable(NamedTuple):
 
     @classmethod
     def of_data(
-        cls, title: str, columns: Sequence[DataColumn], rows: Sequence[object], **options: Any
-    ) -> TextTable:
-        """From declared columns; numbers to the right, texts to the left.
+        cls, title: str, columns: Sequence[DataColumn], rows: Sequence[object], units: Units = IN_SI,
+        **options: Any,
+    ) -> TextTable:  # fmt: skip
+        """From declared columns, in these units; numbers to the right, texts to the left.
 
         >>> columns = DataColumn("name", str), DataColumn("K_dyn", float, 2)
         >>> TextTable.of_data("", columns, ["1", "2.5"]).rows
         [['1', '1.00'], ['2.5', '2.50']]
         """
-        columns = [column for column in columns if column.is_shown(rows)]
+        columns = [column.seen(units) for column in columns if column.is_shown(rows)]
+        if any(units.is_at_output(column.si) for column in columns):
+            title = titled(title, units)
         texts = [c.heading for c in columns if not c.text and any(isinstance(c.of(r), str) for r in rows)]
         return cls.of(title, {c.heading: c.cells(rows) for c in columns}, texts, **options)
 
@@ -198,7 +223,7 @@ def with_unit(value: float, unit: str) -> str:
     >>> with_unit(0.1751, "s"), with_unit(math.nan, "s")
     ('0.1751 s', '-')
     """
-    return NOTHING if math.isnan(value) else f"{short(value)} {unit}"
+    return NOTHING if math.isnan(value) else f"{short(value)} {unit}".rstrip()
 
 
 def label(name: str, unit: str = "", between: str = ", ") -> str:
@@ -247,6 +272,24 @@ def percent(share: float, decimals: int = 1) -> str:
     return f"{fixed(100.0 * share, decimals)}\N{NO-BREAK SPACE}%"
 
 
+def seen(value: float, si: str, units: Units) -> str:
+    """A value in SI at the motor shaft as it is seen, with its unit; a dash for a missing value.
+
+    >>> seen(1600.0, "N*m", Units(torque="kN*m")), seen(math.nan, "rad", Units())
+    ('1.6 kN m', '-')
+    """
+    return with_unit(float(units.shown(value, si)), units.label(si))
+
+
+def titled(title: str, units: Units) -> str:
+    """A title that says at which shaft, where it is not that of the motor.
+
+    >>> titled("Stages", Units())
+    'Stages'
+    """
+    return f"{title}{units.at}" if title else units.at.removeprefix(", ").capitalize()
+
+
 def unit(written: str) -> str:
     """A unit as report and page print it.
 
@@ -271,6 +314,34 @@ def units_of(machine: Machine, given: Machine | None = None) -> Units:
     given = given or machine
     speeds = () if given.target_speed is None else (float(given.target_speed),)
     return _read(machine.units, given.local_gaps, speeds, machine.gear or machine.gear_with())
+
+
+def units_for(machine: Machine, parameter: Parameter) -> Units:
+    """The units of a parameter of a machine: of a limit without losses, of load torques by the sign of all.
+
+    A value that is at the output in the file, as limits.output_torque, is there already.
+    """
+    units = units_of(machine)
+    if units.gear is None or not isinstance(machine, Drive):
+        return units
+    there = parameter.at_output == "here"
+    return units.at_motor if there else units._replace(gear=machine.gear_of(parameter))
+
+
+def seen_at(machine: Any, shaft: str) -> Any:
+    """The machine as it is seen at the "motor" or the "output" shaft, in its units.
+
+    Raises `RefusedError`, the reason, where it has no output.
+
+    >>> from softstart import Drive
+    >>> seen_at(Drive.load("hoist-15kw").replace(gear_ratio=45.0), "output").units
+    'deg, rpm, at output'
+    """
+    gear = machine.gear or machine.gear_with()
+    if shaft == "output" and isinstance(gear, str):
+        raise RefusedError(gear)
+    units = units_of(machine)._replace(gear=gear if shaft == "output" else None)
+    return machine.replace(units=units.text)
 
 
 _read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a frame

@@ -15,7 +15,17 @@ from softstart.start.metrics import REFERENCE
 from softstart.start.recommendation import margins_of
 from softstart.start.run import Run
 from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, head, new_figure
-from softstart.views.numbers import NOTHING, DataColumn, TextTable, number, short, with_unit
+from softstart.views.numbers import (
+    NOTHING,
+    DataColumn,
+    TextTable,
+    number,
+    seen,
+    short,
+    titled,
+    units_of,
+    with_unit,
+)
 from softstart.views.sheet import Sheet, records_file
 from softstart.views.starts import machine_lines
 from softstart.views.traces import draw_trade_off, over_time, shaft_torques, speeds, twists
@@ -65,6 +75,7 @@ def _facts(best: Optimum) -> list[list[str]]:
     run, bound, problem, kept = best.run, best.bound, best.problem, best.kept
     bounded, shafts = bound.kind != "none", run.drive.shaft_names
     known, heat = bounded or kept is not None, best.heat_at_least
+    units = units_of(run.drive)
     gap = f"{best.optimality_gap_percent:.3g} %" if known else NOTHING
     of_shafts = zip(shafts, best.k_dyns, strict=True) if len(shafts) > 1 else ()
     known_starts = {} if problem.scenarios else best.alone
@@ -77,7 +88,7 @@ def _facts(best: Optimum) -> list[list[str]]:
         ["K_dyn", number(best.k_dyn, 6) + limited(problem.k_dyn)],
         ["lower bound of K_dyn", f"{number(bound.k_dyn, 6)}, {bound.kind}" if bounded else NOTHING],
         ["optimality gap", gap if problem.minimise == "k_dyn" and kept is None else ""],
-        ["peak shaft torque", f"{short(run.peak_torque)} N m at {short(run.peak_time)} s"],
+        ["peak shaft torque", f"{seen(run.peak_torque, 'N*m', units)} at {short(run.peak_time)} s"],
         *([f"K_dyn in {name}", number(k, 6)] for name, k in of_shafts),
         ["start time", f"{short(best.end_time)} s{limited(None if kept else problem.start_time, ' s')}"],
         ["lower bound of the start time", f"{short(kept.at_least)} s" if kept else ""],
@@ -101,7 +112,9 @@ def optimum_question(best: Optimum) -> str:
     problem, kept = best.problem, best.kept
     objective = _objective(best)
     if _by_limits(best) and kept is not None:
-        limits = ", ".join(f"{one.name} {short(one.limit)} {one.unit}" for one in kept.margins)
+        limits = ", ".join(
+            f"{name} {short(most)} {of}" for name, _, most, of in (m.seen for m in kept.margins)
+        )
         objective = f"minimum start time within the limits ({limits})"
     bounds = {
         "start time at most {:.6g} s": None if _by_limits(best) else problem.start_time,
@@ -193,9 +206,9 @@ def _value_of_knowledge(best: Optimum) -> list[str]:
 
 SCENARIOS = (  # of (number, two masses, K_dyn, start time)
     DataColumn("scenario", lambda row: str(row[0])),
-    DataColumn("gap\nrad", lambda row: row[1].gap),
-    DataColumn("J2\nkg m2", lambda row: row[1].J2),
-    DataColumn("Mc\nN m", lambda row: row[1].Mc),
+    DataColumn("gap\nrad", lambda row: row[1].gap, si="rad"),
+    DataColumn("J2\nkg m2", lambda row: row[1].J2, si="kg*m^2"),
+    DataColumn("Mc\nN m", lambda row: row[1].Mc, si="N*m"),
     DataColumn("K_dyn", lambda row: row[2], 4),
     DataColumn("start\ntime s", lambda row: row[3], digits=5),
 )
@@ -210,7 +223,7 @@ def scenario_table(best: Optimum) -> TextTable:
     """What is different in each machine that the profile serves, and its start."""
     models = [one.lever_rule_model for one in best.problem.machines]
     rows = list(zip(itertools.count(1), models, best.k_dyn_each, best.start_times, strict=False))
-    return TextTable.of_data("", SCENARIOS, rows, bold=[best.worst])
+    return TextTable.of_data("", SCENARIOS, rows, units_of(best.problem.drive), bold=[best.worst])
 
 
 def bound_sentence(best: Optimum) -> str:
@@ -231,38 +244,49 @@ def bound_sentence(best: Optimum) -> str:
 def optimum_figure(best: Optimum) -> Figure:
     """Motor torque, shaft torque with its bound, speeds and twist of an optimal start, with all limits."""
     problem, others = best.problem, [one for one in best.runs if one is not best.run]
+    units = units_of(best.run.drive)
+
+    def torque(value: Any) -> Any:
+        return units.shown(value, "N*m")
 
     def motor(axes: Axes, run: Run) -> None:
         least, most = problem.lowest_torque, problem.highest_torque
         for limit in (least, most):
-            axes.axhline(limit, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="limits" if limit else None)
+            axes.axhline(
+                torque(limit), color=COLOURS[3], lw=1.0, ls=DASHES[1], label="limits" if limit else None
+            )
         if problem.torque_speed:
             at_speed = np.interp(run.w1, *np.array(problem.torque_speed).T)
-            axes.plot(run.t, at_speed, color=COLOURS[3], lw=1.0, ls=":", label="limit at w1")
-        axes.plot(run.t, run.u, color=COLOURS[1], label="realised u")
+            axes.plot(run.t, torque(at_speed), color=COLOURS[3], lw=1.0, ls=":", label="limit at w1")
+        axes.plot(run.t, torque(run.u), color=COLOURS[1], label="realised u")
         inside = best.profile.time <= run.end_time
         times = np.append(best.profile.time[inside], run.end_time)
         demand = np.append(best.profile.torque[inside], best.profile.at(run.end_time))
-        axes.plot(times, demand, color=COLOURS[6], lw=0.9, ls=DASHES[3], label="demand")
-        low, high = float(np.min(run.u)), float(np.max(run.u))
-        head(axes, f"motor torque {low:.4g} to {high:.4g} of {least:.4g} to {most:.4g} N m", "torque, N m")
+        axes.plot(times, torque(demand), color=COLOURS[6], lw=0.9, ls=DASHES[3], label="demand")
+        ends = np.array([np.min(run.u), np.max(run.u), least, most], dtype=np.float64)
+        low, high, least, most = torque(ends).tolist()
+        unit = units.label("N*m")
+        head(
+            axes,
+            f"motor torque {low:.4g} to {high:.4g} of {least:.4g} to {most:.4g} {unit}",
+            f"torque, {unit}",
+        )
         axes.margins(y=0.08)
 
     def shaft(axes: Axes, run: Run) -> None:
         for other in others:
-            axes.plot(other.t, other.T, color=GREY, lw=0.7)
+            axes.plot(other.t, torque(other.T), color=GREY, lw=0.7)
         shaft_torques(axes, run)
         title = f"K_dyn {best.k_dyn:.4f}"
         if best.bound.kind != "none":
             least = best.bound.k_dyn * problem.base_torque
-            axes.axhline(least, color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
+            axes.axhline(torque(least), color=COLOURS[4], lw=1.6, ls=DASHES[3], label="bound")
             title += f", at least {best.bound.k_dyn:.4f}"
-        limit = run.permissible_torque if _by_limits(best) else math.nan
-        most = limit if problem.k_dyn is None else problem.k_dyn * problem.base_torque
-        if not math.isnan(most):
+        if problem.k_dyn is not None:
+            most = torque(problem.k_dyn * problem.base_torque)
             axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))  # "15 % less" is seen as that
-        head(axes, title, "torque, N m")
+        head(axes, title, f"torque, {units.label('N*m')}")
 
     def speed(axes: Axes, run: Run) -> None:
         speeds(axes, run)
@@ -285,7 +309,7 @@ def optimum_sheet(best: Optimum, others: Sequence[Run] = ()) -> Sheet:
     replay = REPLAY.format(what=drive.WHAT.removeprefix("a "))
     about = {"drive": drive.name, "k_dyn": best.k_dyn}
     return Sheet(
-        f"{drive.name}: {'one profile for all' if several else best_start(drive)}",
+        titled(f"{drive.name}: {'one profile for all' if several else best_start(drive)}", units_of(drive)),
         [*machine_lines(drive), f"  task   {optimum_question(best)}", f"  method {best.method}: {best.why}"],
         facts=_facts(best),
         tables=[

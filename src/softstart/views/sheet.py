@@ -17,7 +17,7 @@ from softstart.drive import Machine
 from softstart.views.drawing import save_figure, svg_of
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
-from softstart.views.numbers import Column, TextTable, printed
+from softstart.views.numbers import Column, TextTable, printed, titled, units_for, units_of
 from softstart.views.terminal import blocks_of, console, print_lines, print_table, sentence
 
 if TYPE_CHECKING:
@@ -224,10 +224,12 @@ def _parameters(machine: Machine) -> TextTable:
     for path, (parameter, value) in machine.parameters_by_path().items():
         if value is not None and value != "" and path != "name":
             values = value if isinstance(value, tuple) else (value,)
-            shown = ", ".join(f"{one:.10g}" if isinstance(one, float) else str(one) for one in values)
-            unit = "" if parameter.unit == "1" or isinstance(value, str) else parameter.unit
+            si, seen = parameter.unit, units_for(machine, parameter)
+            shown = ", ".join(f"{seen.shown(v, si):.10g}" if isinstance(v, float) else str(v) for v in values)
+            unit = "" if si == "1" or isinstance(value, str) else seen.of(si)
             rows.append([path, parameter.symbol, shown, unit, parameter.meaning])
-    return TextTable.of_texts(("key", "symbol", "value", "unit", "meaning"), rows)
+    headings = ("key", "symbol", "value", "unit", "meaning")
+    return TextTable.of_texts(headings, rows)._replace(title=titled("", units_of(machine)))
 
 
 # notebook --------------------------------------------------------------------------------------------------

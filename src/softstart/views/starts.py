@@ -19,7 +19,17 @@ from softstart.start.recommendation import Recommendation, Row, checked_limits, 
 from softstart.start.run import Run, Stage
 from softstart.views.drives import controllers_set_up, drive_lines
 from softstart.views.markdown import file_stem, markdown
-from softstart.views.numbers import DataColumn, TextTable, label, number, short, with_unit
+from softstart.views.numbers import (
+    DataColumn,
+    TextTable,
+    label,
+    number,
+    seen,
+    short,
+    titled,
+    units_of,
+    with_unit,
+)
 from softstart.views.sheet import Sheet, Writer, records_file, rows_file
 from softstart.views.traces import comparison_figure, draw_trade_off, run_figure, torques, trade_off_figure
 
@@ -50,20 +60,21 @@ def figure_rows(run: Run) -> list[list[str]]:
     first, second = run.stage_durations
     of_one = f" from {run.position}" if run.positions else ""
     names, released = run.drive.shaft_names, not math.isnan(run.release_time)
-    there = with_unit(run.peak_torque_at_output, "N m") if run.drive.gear else ""
+    units, gear = units_of(run.drive), run.drive.gear
+    there = seen(run.peak_torque, "N*m", units._replace(gear=gear)) if gear and not units.gear else ""
     where = f" in {names[run.worst_shaft]}" if len(names) > 1 else ""
     return [
         ["K_dyn", f"{number(run.k_dyn, 6)}{where}"],
         ["K_dyn of the first contact", number(run.k_dyn_first_contact, 6)],
-        ["peak shaft torque", f"{with_unit(run.peak_torque, 'N m')} at {with_unit(run.peak_time, 's')}"],
+        ["peak shaft torque", f"{seen(run.peak_torque, 'N*m', units)} at {with_unit(run.peak_time, 's')}"],
         ["the same at the output", there],
         ["start time", with_unit(run.start_time, "s")],
         ["settled time", with_unit(run.settled_time, "s")],
         ["overshoot", overshoot_of(run)],
         ["shaft torque settled after", with_unit(run.settling_time(), "s")],
         ["first contact", f"{with_unit(run.first_contact, 's')}{of_one}"],
-        ["speed of impact", with_unit(run.impact_speed, "rad/s")],
-        ["motor torque at contact", f"{with_unit(run.torque_at_contact, 'N m')}{of_one}"],
+        ["speed of impact", seen(run.impact_speed, "rad/s", units)],
+        ["motor torque at contact", f"{seen(run.torque_at_contact, 'N*m', units)}{of_one}"],
         ["stage 1, stage 2", f"{with_unit(first, 's')}, {with_unit(second, 's')}{of_one}"],
         ["contacts", f"{run.contacts}{of_one}"],
         ["end of the run", f"{with_unit(run.end_time, 's')}{of_one}"],
@@ -108,14 +119,15 @@ def clipped_torque(run: Run) -> str:
     each that answered with an infinite torque.
     """
     excess, time = run.clipped
-    motor = run.drive.motor
+    motor, units = run.drive.motor, units_of(run.drive)
     low, high = float(motor.minimum_torque), float(motor.maximum_torque)
     infinite = math.isinf(excess)
     saturates = run.controller is not None and run.controller.saturates
     if not infinite and (saturates or excess <= SAME_TORQUE * max(abs(low), abs(high))):
         return ""
-    over = "infinite" if infinite else f"up to {short(excess)} N m"
-    return f"the demand is {over} beyond the limits {short(low)} and {short(high)} N m, for {short(time)} s"
+    over = "infinite" if infinite else f"up to {seen(excess, 'N*m', units)}"
+    least, most = short(float(units.shown(low, "N*m"))), seen(high, "N*m", units)
+    return f"the demand is {over} beyond the limits {least} and {most}, for {short(time)} s"
 
 
 def outcome(run: Run) -> str:
@@ -135,7 +147,7 @@ STAGES = (
     DataColumn("gap", _gap_in),
     DataColumn("start s", lambda stage: stage.start, digits=5),
     DataColumn("duration s", lambda stage: stage.duration),
-    DataColumn("peak torque N m", lambda stage: stage.peak_torque, digits=5),
+    DataColumn("peak torque N m", lambda stage: stage.peak_torque, digits=5, si="N*m"),
     DataColumn("at s", lambda stage: stage.peak_time, digits=5),
 )
 EVENTS = (  # of `event_rows`
@@ -159,7 +171,7 @@ def _start_tables(run: Run) -> list[TextTable]:
     events = EVENTS if len(run.drive.shaft_names) > 1 else EVENTS[:-1]
     return [
         *([] if isinstance(run.drive, Drive) else [shaft_table(run)]),
-        TextTable.of_data("Stages", STAGES, run.stages, most=SHOWN),
+        TextTable.of_data("Stages", STAGES, run.stages, units_of(run.drive), most=SHOWN),
         TextTable.of_data("Events", events, event_rows(run), most=SHOWN),
     ]
 
@@ -171,13 +183,13 @@ def shaft_table(run: Run) -> TextTable:
         DataColumn("shaft", lambda k: run.drive.shaft_names[k]),
         DataColumn("K", lambda k: float(run.k_dyns[k]), 4),
         DataColumn("over its\nown mean", lambda k: float(run.shaft_factors[k]), 4),
-        DataColumn("torque at\nmotor shaft\nN m", lambda k: float(run.peak_torques[k])),
-        DataColumn("torque at\nown shaft\nN m", lambda k: float(own[k])),
+        DataColumn("torque at\nmotor shaft\nN m", lambda k: float(run.peak_torques[k]), si="N*m"),
+        DataColumn("torque at\nown shaft\nN m", lambda k: float(own[k]), si="N*m"),
         DataColumn("at s", lambda k: float(run.peak_times[k]), digits=5),
     ]
     if run.drive.limits:
         columns.append(DataColumn("of the\npermissible\n%", lambda k: 100.0 * float(run.utilisation[k]), 1))
-    return TextTable.of_data("Shafts", columns, range(len(run.drive.shaft_names)))
+    return TextTable.of_data("Shafts", columns, range(len(run.drive.shaft_names)), units_of(run.drive))
 
 
 def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
@@ -186,7 +198,7 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
     values, stem = parameters_of(run), file_stem(run.controller_name)
     summary = {key: value for key, value in run.summary().items() if key != "parameters"}
     return Sheet(
-        f"{run.drive.name}: start under {run.controller_name}",
+        titled(f"{run.drive.name}: start under {run.controller_name}", units_of(run.drive)),
         [
             *machine_lines(run.drive, fitted_to),
             f"  under  {run.controller_name}{' (' + values + ')' if values else ''}",
@@ -212,7 +224,7 @@ def run_sheet(run: Run, fitted_to: Drive | None = None) -> Sheet:
     )
 
 
-def parameters_of(run: Run | DutyRun, text: Callable[[float], str] = short) -> str:
+def parameters_of(run: Run | DutyRun) -> str:
     """The parameters with which the strategy of a start is set up, each value in its unit.
 
     >>> from softstart import simulate
@@ -221,18 +233,23 @@ def parameters_of(run: Run | DutyRun, text: Callable[[float], str] = short) -> s
     """
     assert run.controller is not None
     declared = declared_parameters(run.controller)
-    units = {name: label("", one.unit, " ") for name, one in declared.items()}
+    units, si = units_of(run.drive), {name: one.unit for name, one in declared.items()}
     return ", ".join(
-        f"{key} = {text(value) if isinstance(value, float) else value}{units.get(key, '')}"
+        f"{key} = {seen(value, si.get(key, '1'), units) if isinstance(value, float) else value}"
         for key, value in run.controller.parameters.items()
     )
 
 
 def what_it_does(run: Run) -> str:
-    """What the strategy of a start does, and its parameters with all digits."""
+    """What the strategy of a start does, and its parameters as --param takes them, with all digits."""
     assert run.controller is not None
-    values = parameters_of(run, str) or "none"
-    return ". ".join(filter(None, [type(run.controller).summary, f"Parameters: {values}."]))
+    declared = declared_parameters(run.controller)
+    values = ", ".join(
+        f"{key} = {value}{label('', declared[key].unit, ' ') if key in declared else ''}"
+        for key, value in run.controller.parameters.items()
+    )
+    where = " at the motor shaft" if units_of(run.drive).gear else ""
+    return ". ".join(filter(None, [type(run.controller).summary, f"Parameters{where}: {values or 'none'}."]))
 
 
 # a comparison --------------------------------------------------------------------------------------------
@@ -248,7 +265,7 @@ PEAK_COLUMNS = (
     DataColumn("K_dyn", lambda row: row.run.k_dyn, 3),
     DataColumn("K\nworn", lambda row: row.k_dyn_worn_gap, 3),
     DataColumn("K\nlight", lambda row: row.k_dyn_light_load, 3),
-    DataColumn("peak\nN m", lambda row: row.run.peak_torque),
+    DataColumn("peak\nN m", lambda row: row.run.peak_torque, si="N*m"),
 )
 
 
@@ -260,7 +277,7 @@ def _latest(row: Row) -> float:
 INTERVALS = (
     DataColumn("K_dyn\nfrom", lambda row: row.intervals["k_dyn"][0], 3),
     DataColumn("K_dyn\nto", lambda row: row.intervals["k_dyn"][1], 3),
-    DataColumn("peak to\nN m", lambda row: row.intervals["peak_torque"][1]),
+    DataColumn("peak to\nN m", lambda row: row.intervals["peak_torque"][1], si="N*m"),
     DataColumn("start\ntime to s", _latest),
 )
 TIME_COLUMNS = (
@@ -274,7 +291,7 @@ TIMES = (START_TIME, SETTLED_LATER)
 CONTACTS = DataColumn("contacts", lambda row: row.run.contacts, 0)
 AT_THE_GAP = (
     DataColumn("first\ncontact\ns", lambda row: row.run.first_contact, digits=3),
-    DataColumn("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3),
+    DataColumn("u at\ncontact\nN m", lambda row: row.run.torque_at_contact, digits=3, si="N*m"),
     DataColumn("stage 1\ns", lambda row: row.run.stage_durations[0], digits=3),
     DataColumn("stage 2\ns", lambda row: row.run.stage_durations[1], digits=3),
     DataColumn("K first\ncontact", lambda row: row.run.k_dyn_first_contact, 3),
@@ -320,7 +337,7 @@ def comparison_table(
         columns.append(DataColumn("set to", lambda row: row.set_to))
     if judged and any(row.against_limits for row in rows):
         columns.append(DataColumn("limits", lambda row: row.against_limits))
-    return TextTable.of_data(title, columns, rows, bold=bold)
+    return TextTable.of_data(title, columns, rows, units_of(rows[0].run.drive), bold=bold)
 
 
 def at_soft_end(rows: Sequence[Row]) -> tuple[DataColumn, ...]:
@@ -391,20 +408,21 @@ def settled_means(rows: Sequence[Row]) -> str:
 
 def definitions(comparison: Comparison) -> list[str]:
     """What the columns mean."""
-    run = comparison.rows[0].run
+    run, units = comparison.rows[0].run, units_of(comparison.drive)
     base = run.peak_torque / run.k_dyn if run.k_dyn > 0.0 else math.nan
     several = len(comparison.drive.shaft_names) > 1
     nominal = f'"{comparison.fitted_to.name}"' if comparison.fitted_to else "this machine"
     found = [
         f"K_dyn = {'largest torque of all shafts at the motor shaft' if several else 'peak shaft torque'} / "
-        f"{base:.4g} N m, the mean shaft torque under full starting torque.",
+        f"{units.shown(base, 'N*m'):.4g} {units.label('N*m')}, the mean shaft torque under full starting "
+        "torque.",
         f"{LEGEND} Strategies are set up for {nominal}.",
         settled_means(comparison.rows),
     ]
     if checked_limits(comparison.drive):
         cases = ", ".join(("the machine as it is", *comparison.worst_case))
         found.append(f"limits: the smallest margin in the worst of {cases}.")
-        if comparison.drive.limits.output_torque is not None:
+        if comparison.drive.limits.output_torque is not None or units.gear:
             found.append(
                 "output torque: that of the shaft times the gear ratio, without losses, the safe side."
             )
@@ -472,7 +490,7 @@ def comparison_sheet(comparison: Comparison, rows: Sequence[Row] = (), details: 
         files[f"trace-{stem}.csv"] = run.to_csv
         behind.append(f"### {markdown(stem)}\n\n{markdown(what_it_does(run))}\n\n![{stem}](run-{stem}.svg)")
     return Sheet(
-        f"{machine.name}: soft-start strategies compared",
+        titled(f"{machine.name}: soft-start strategies compared", units_of(machine)),
         machine_lines(machine, comparison.fitted_to),
         tables=[comparison_table(rows, which, title, bold) for title, which in parts],
         conclusions=[

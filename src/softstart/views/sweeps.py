@@ -15,7 +15,17 @@ from softstart.start.status import Status
 from softstart.sweeping.summary import SHARES, pieces
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
-from softstart.views.numbers import NOTHING, Column, TextTable, column_of, label, number, plural, plural_of
+from softstart.views.numbers import (
+    NOTHING,
+    Column,
+    TextTable,
+    column_of,
+    label,
+    number,
+    plural,
+    plural_of,
+    seen_at,
+)
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file
 from softstart.views.starts import machine_lines
 
@@ -269,7 +279,7 @@ def sweep_sheet(
     return Sheet(
         f"{drive.name}: {plural(summary.starts, _what(results))}",
         [
-            *machine_lines(drive),
+            *machine_lines(seen_at(drive, "motor")),
             f"  Duty: {duty}" if (duty := results.attrs.get("softstart_duty")) else "",
             f"  {controllers_set_up(None, fitted_to)}" if fitted_to else "",
         ],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,8 @@ from softstart.views.numbers import (
     label,
     plural,
     short,
+    titled,
+    units_of,
 )
 from softstart.views.sheet import Sheet, Writer, columns_file
 from softstart.views.starts import machine_lines
@@ -52,7 +54,10 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
     assert table is not None
     name, metric, q = tuning.metric, _metric(tuning), tuning.problem
     if what == "gains":
-        maps = {one.name: label(one.name, one.unit) for one in tuning.problem.ranges}
+        si = {one.name: one.unit for one in tuning.problem.ranges}
+        units = units_of(tuning.drive)
+        table = table.assign({name: units.shown(table[name], unit) for name, unit in si.items()})
+        maps = {name: label(name, units.label(unit)) for name, unit in si.items()}
         return _maps(tuning, table, maps, "gains of each cell")
     if what == "price":
         maps = {one: title for one, title in PRICES.items() if one in table}
@@ -64,8 +69,11 @@ def figure_of(tuning: Tuning, what: str) -> Figure:
 
 def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alike: int = 0) -> Figure:
     """Maps side by side; the first `alike` share one scale of colours."""
-    q = tuning.problem
-    gaps, inertias = ([f"{value:.3g}" for value in axis] for axis in (q.gaps, q.load_inertias))
+    q, units = tuning.problem, units_of(tuning.drive)
+    gaps, inertias = (
+        [f"{units.shown(value, si):.3g}" for value in axis]
+        for axis, si in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
+    )
     size = max(3.2, 1.2 + 0.62 * len(inertias)), max(1.6, 0.9 + 0.42 * len(gaps))
     fields = [np.asarray(table[name], dtype=np.float64) for name in maps]
     late = ~np.asarray(table["in_time"], dtype=bool) if tuning.metric in maps else None
@@ -73,7 +81,9 @@ def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alik
         title += " (struck out: later than allowed)"
     with drawing():
         own = "" if len(tuning.drive.mass_names) == 2 else " at its own shaft"
-        figure, axes = panels(len(maps), size, 3, f"load inertia J2{own}, kg m2", "gap, rad")
+        figure, axes = panels(
+            len(maps), size, 3, f"load inertia J2{own}, kg m2", f"gap, {units.label('rad')}"
+        )
         for index, (panel, name) in enumerate(zip(axes, maps, strict=True)):
             values = fields[index]
             scale = colour_scale(*(fields[:alike] if index < alike else [values]))
@@ -82,7 +92,7 @@ def _maps(tuning: Tuning, table: Dataset, maps: dict[str, str], title: str, alik
             decimals = min(max(2 - math.floor(math.log10(largest)), 0), 6) if largest else 2  # three digits
             heat_map(panel, inertias, gaps, values, scale, decimals=decimals, struck=struck)
             panel.set_title(maps[name], loc="left", fontsize=SMALL)
-        entitle(figure, f"{tuning.drive.name}: {tuning.controller}, {title}")
+        entitle(figure, titled(f"{tuning.drive.name}: {tuning.controller}, {title}", units))
     return figure
 
 
@@ -107,7 +117,7 @@ def tuning_question(tuning: Tuning) -> str:
     return (
         f"{tuning.controller}: {what}{duty}, {q.time_name} {q.bound}, "
         f"gaps: {len(q.gaps)}, load inertias: {len(q.load_inertias)}{over}. Tuned: "
-        f"{'; '.join(f'{one.name} {one.text()}' for one in q.ranges)}."
+        f"{'; '.join(f'{one.name} {one.text(units_of(tuning.drive))}' for one in q.ranges)}."
     )
 
 
@@ -122,11 +132,16 @@ _TIMES = {"start_time": "start\ntime s", "settled_time": "settled\nin s"}
 
 def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
     """The schedule, one row per cell."""
-    of, metric, q = _columns(table), _metric(tuning), tuning.problem
+    of, metric, q, units = _columns(table), _metric(tuning), tuning.problem, units_of(tuning.drive)
     numbers = {
-        "gap\nrad": of["gap"],
-        "J2\nkg m2": of["load_inertia"],
-        **{label(one.name, one.unit, "\n"): of[one.name] for one in tuning.problem.ranges},
+        f"gap\n{units.label('rad')}": units.shown(np.array(of["gap"]), "rad").tolist(),
+        "J2\nkg m2": units.shown(np.array(of["load_inertia"]), "kg*m^2").tolist(),
+        **{
+            label(one.name, units.label(one.unit), "\n"): units.shown(
+                np.array(of[one.name]), one.unit
+            ).tolist()
+            for one in tuning.problem.ranges
+        },
         f"{metric}\ndefault": of[f"{tuning.metric}_default"],
         f"{metric}\ntuned": of[tuning.metric],
         _TIMES[q.time]: of[q.time],
@@ -136,24 +151,27 @@ def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
         "in\ntime": ["yes" if good else "no" for good in of["in_time"]],
         "searches\nagree": [f"{n} of {tuning.problem.restarts}" for n in of["agreement"]],
     }
-    return TextTable.of("Gains for each cell", columns, most=SHOWN, keys=2)
+    return TextTable.of(titled("Gains for each cell", units), columns, most=SHOWN, keys=2)
 
 
 def _robust_table(tuning: Tuning, robust: RobustSet) -> TextTable:
     """The robust set beside the defaults."""
-    units = {one.name: one.unit for one in tuning.problem.ranges}
+    si, units = {one.name: one.unit for one in tuning.problem.ranges}, units_of(tuning.drive)
 
     def there(name: str) -> str:
-        return at_output(tuning.drive, robust.gains[name], units[name])
+        return "" if units.gear else at_output(tuning.drive, robust.gains[name], si[name])
+
+    def shown(gains: Mapping[str, float]) -> Callable[[str], float]:
+        return lambda name: float(units.shown(gains[name], si[name]))
 
     columns = [
         DataColumn("parameter", str),
-        DataColumn("default", lambda name: robust.defaults[name], text=short),
-        DataColumn("robust", lambda name: robust.gains[name], text=short),
-        DataColumn("unit", lambda name: label("", units[name], "")),
+        DataColumn("default", shown(robust.defaults), text=short),
+        DataColumn("robust", shown(robust.gains), text=short),
+        DataColumn("unit", lambda name: units.label(si[name])),
         DataColumn("robust, at\nthe output", there, text=str, optional=True),
     ]
-    return TextTable.of_data("One set for all", columns, list(robust.gains))
+    return TextTable.of_data(titled("One set for all", units), columns, list(robust.gains))
 
 
 def _tables(tuning: Tuning) -> Iterator[TextTable]:
@@ -170,10 +188,12 @@ def _tables(tuning: Tuning) -> Iterator[TextTable]:
 
 def _grid(tuning: Tuning, title: str, values: DataArray) -> TextTable:
     """A figure over the grid, one row per gap."""
-    q = tuning.problem
-    cells = [short(gap) for gap in q.gaps], *(column_of(column) for column in values.to_numpy().T.tolist())
-    headings = ["gap rad", *(f"J2 {inertia:.4g}" for inertia in q.load_inertias)]
-    return TextTable(title, list(map(Column, headings)), list(zip(*cells, strict=True)))
+    q, units = tuning.problem, units_of(tuning.drive)
+    gaps = [short(float(units.shown(gap, "rad"))) for gap in q.gaps]
+    cells = gaps, *(column_of(column) for column in values.to_numpy().T.tolist())
+    inertias = [units.shown(inertia, "kg*m^2") for inertia in q.load_inertias]
+    headings = [f"gap {units.label('rad')}", *(f"J2 {inertia:.4g}" for inertia in inertias)]
+    return TextTable(titled(title, units), list(map(Column, headings)), list(zip(*cells, strict=True)))
 
 
 def _digits(value: float) -> str:
@@ -241,14 +261,21 @@ def derived_note(robust: RobustSet) -> str:
     """What the robust set takes from the nominal drive beside its gains, and how to get the same; else ""."""
     if not robust.derived:
         return ""
-    units = {name: one.unit for name, one in declared_parameters(robust.controller.controller).items()}
+    nominal = robust.controller.nominal
+    si, units = declared_parameters(robust.controller.controller), units_of(nominal)
+
+    def words(value: float, si: str, digits: int) -> str:
+        return f"{units.shown(value, si):.{digits}g} {units.label(si)}".rstrip()
+
     texts = [
-        f"{name} = {value:.5g}{label('', units.get(name, ''), ' ')}" for name, value in robust.derived.items()
+        f"{name} = {words(value, si[name].unit if name in si else '1', 5)}"
+        for name, value in robust.derived.items()
     ]
     more = f" and {len(texts) - MOST_DERIVED} more (table about.derived)" if len(texts) > MOST_DERIVED else ""
-    gap, inertia = robust.controller.nominal.gap_and_inertia
+    gap, inertia = nominal.gap_and_inertia
     return (
-        f"The set derives from the nominal drive (gap {gap:.4g} rad, J2 {inertia:.4g} kg m2): "
+        f"The set derives from the nominal drive (gap {words(gap, 'rad', 4)}, "
+        f"J2 {words(inertia, 'kg*m^2', 4)}): "
         f"{', '.join(texts[:MOST_DERIVED])}{more}. In other cells the gains alone derive other values, with "
         "other results. The same controller everywhere: --controller robust.toml, for an export --gains "
         "robust.toml, in Python robust.controller (RobustGains)."
@@ -300,7 +327,7 @@ def tuning_notes(tuning: Tuning) -> list[str]:
             notes.append(f"{title}: {missing} of {price[ratio].size} cells late or without an optimum.")
     if price is not None and any("optimum" in str(name) for name in price):
         notes.append("Optimum: drive of the cell, motor without lag, dead time and noise; terminal reached.")
-    if drive.gear is not None:
+    if drive.gear is not None and not units_of(drive).gear:
         gaps, inertias = (
             " to ".join(dict.fromkeys(at_output(drive, value, unit) for value in (axis[0], axis[-1])))
             for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
@@ -326,7 +353,7 @@ def tuning_sheet(tuning: Tuning) -> Sheet:
         if (table := getattr(tuning, name)) is not None:
             files[f"{name}.csv"] = columns_file(_columns(table))
     return Sheet(
-        f"{tuning.drive.name}: {tuning.controller} tuned",
+        titled(f"{tuning.drive.name}: {tuning.controller} tuned", units_of(tuning.drive)),
         machine_lines(tuning.drive),
         tuning_question(tuning),
         tables=list(_tables(tuning)),

@@ -287,7 +287,7 @@ def test_a_setting_of_a_data_sheet_is_made_at_its_own_part(run, place):
     code, out, err = run("simulate", "sheet.toml", "--controller", "direct", *more)
     assert (code, "is a data sheet" in err) == (0, True)
     assert "J2 = 0.401662 kg m2, Mc = 20 N m" in out
-    assert "gap = 0.17686 rad" in out
+    assert "gap = 608 arcmin" in out
     assert "assumed: damping ratio 0.02" in out
     assert "assumed:" not in run("simulate", "sheet.toml", "--controller", "direct", "--set", "damping=1").out
     code, _, err = run("simulate", "sheet.toml", "--controller", "direct", "--set", "gear.backlash=16")
