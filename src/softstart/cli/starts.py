@@ -87,7 +87,7 @@ def _side_by_side(
 ) -> Output:  # fmt: skip
     if arguments.pop("fitted_to") is not None:
         raise InputError("--fitted-to: side by side strategies are set up for their machines; leave it out.")
-    other = None if beside is None else options.read_machine_or_identified(beside, ())
+    other = None if beside is None else options.seen(options.read_machine_or_identified(beside, ()))
     with working("starting both machines ..."), attributed(), options.named_as_options(second="BESIDE"):
         return softstart.side_by_side(drive, other, strategies, worn_gap=worn_gap, **arguments)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from softstart.start.beside import SideBySide
 from softstart.views.drawing import COLOURS, GREY, drawing, mark_points, new_figure
-from softstart.views.numbers import DataColumn, TextTable
+from softstart.views.numbers import DataColumn, TextTable, units_of
 from softstart.views.sheet import Sheet, records_file
 from softstart.views.starts import PEAK_COLUMNS, TIME_COLUMNS, machine_lines
 
@@ -27,11 +27,11 @@ def beside_table(both: SideBySide, title: str = "") -> TextTable:
     """The strategies, each figure for both machines."""
     rows = sorted(both.pairs, key=lambda pair: float(pair[0].run.k_dyn))
     columns = [DataColumn("strategy", _of(DataColumn("", lambda row: row.marked), 0))]
-    for column in FIGURES:
-        columns += [
-            column._replace(heading=f"{column.heading}\n{letter}", of=_of(column, k))
-            for k, letter in enumerate(LETTERS)
-        ]
+    units = [units_of(one.drive) for one in both.machines]
+    for figure in FIGURES:
+        for k, column in enumerate(map(figure.seen, units)):
+            heading = f"{column.heading}{units[k].at if figure.si else ''}\n{LETTERS[k]}"
+            columns.append(column._replace(heading=heading, of=_of(column, k), si=""))
     if any(row.against_limits for pair in both.pairs for row in pair):
         limits = DataColumn("limits", lambda row: row.against_limits)
         columns += [limits._replace(heading=f"limits\n{LETTERS[k]}", of=_of(limits, k)) for k in (0, 1)]
