@@ -27,6 +27,7 @@ from softstart.page.session import LONGEST_DUTY, EqualTime, Inputs, Reference, S
 from softstart.quantities import Units
 from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
+from softstart.views.drawing import strategy_colours
 from softstart.views.numbers import unit
 from softstart.views.starts import NO_STIFFNESS, position_notes
 
@@ -161,6 +162,8 @@ class FrameBuilder:
             else "",
             "map_is_old": not self._map_is_right(),
         }
+        if self._is_new("colours", colours := strategy_colours(list(inputs.controllers))):
+            frame["colours"] = colours
         parts = (("groups", self._machine), ("strategy", self._strategy), ("duty_fields", self._duty))
         for part, entries in parts:
             if self._is_new(part, (entries, units, self._folded)):

@@ -7,7 +7,7 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
+from softstart.controller.finding import ready_controller_names
 from softstart.input.files import write_whole
 from softstart.views.numbers import cut
 
@@ -32,9 +33,17 @@ if TYPE_CHECKING:
 
 # Okabe-Ito: told apart by colour-blind readers and in grey
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31")
+# of strategies, on light and on dark paper: told apart by colour-blind readers, and none is near the red of a
+# limit or the black of the motor torque (tests/softstart/page/test_palette.py)
+STRATEGIES = (
+    ("#359798", "#6ac2c1"), ("#b18e25", "#e3970d"), ("#2400e9", "#3753fe"), ("#715646", "#317154"),
+    ("#5a7600", "#b3d26f"), ("#860e6d", "#7a8d3b"), ("#a441b0", "#eea8ff"), ("#1d4e00", "#84fe41"),
+    ("#ff42bd", "#c00093"), ("#9164ff", "#967ffe"), ("#581130", "#b37fa9"), ("#5e00a9", "#844fc3"),
+)  # fmt: skip
 SHAFTS = tuple(COLOURS[k] for k in (0, 2, 4, 3, 5, 7))  # of a chain; the motor has another one
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0, (8, 2)))
 GREY, SMALL = "#666666", 9.5
+LIMIT = "#C02822"  # red: what is permitted, as on the page
 GAP_SHADE = "#E8ECEF"
 MARKERS = "osD^vPX*<>hd"
 COLOUR_MAP, MISSING = "cividis", "#D0D0D0"  # even in lightness, for colour-blind and grey readers alike
@@ -150,12 +159,35 @@ def verbatim(name: str) -> str:
     return cut(name, LONGEST_NAME).replace("$", r"\$")
 
 
-def mark_points(axes: Axes, points: Sequence[tuple[str, float, float]], filled: Sequence[int] = ()) -> None:
-    """A mark for each point (name, x, y), named in the legend beside the panel; some are filled."""
+def strategy_colours(names: Sequence[str]) -> dict[str, tuple[str, str]]:
+    """The colours of strategies on light and dark paper: of installed ones the same in all figures.
+
+    Others, as tuned gains and optima, follow in their order.
+
+    >>> strategy_colours(["ramp"])["ramp"] == strategy_colours(["direct", "mine", "ramp"])["ramp"]
+    True
+    """
+    order = dict.fromkeys([*ready_controller_names(), *names])
+    places = {name: STRATEGIES[place % len(STRATEGIES)] for place, name in enumerate(order)}
+    return {name: places[name] for name in names}
+
+
+def mark_points(
+    axes: Axes,
+    points: Sequence[tuple[str, float, float]],
+    filled: Sequence[int] = (),
+    notes: Mapping[str, str] | None = None,
+) -> None:
+    """A mark for each strategy (name, x, y), named in the legend beside the panel; some are filled.
+
+    `notes` are added to names there.
+    """
+    colours = strategy_colours([name for name, _, _ in points])
     for index, (name, x, y) in enumerate(points):
-        colour, marker = COLOURS[(index + 1) % len(COLOURS)], MARKERS[index % len(MARKERS)]
+        colour, marker = colours[name][0], MARKERS[index % len(MARKERS)]
+        label = verbatim(name + (notes or {}).get(name, ""))
         axes.plot([x], [y], marker, ms=8, mfc=colour if index in filled else "none", mew=1.8, color=colour,
-                  label=verbatim(name), clip_on=False, ls="none", zorder=4)  # fmt: skip
+                  label=label, clip_on=False, ls="none", zorder=4)  # fmt: skip
     legend_beside(axes, fontsize=8.5)
 
 

@@ -21,6 +21,7 @@ from softstart.views.drawing import (
     COLOURS,
     DASHES,
     GREY,
+    LIMIT,
     drawing,
     entitle,
     head,
@@ -524,7 +525,7 @@ def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math
     if not math.isnan(permissible):
         most = units.lossless.shown(permissible, "N*m")
         for sign, label in ((1.0, "permissible"), (-1.0, None)):
-            axes.axhline(sign * most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label=label)
+            axes.axhline(sign * most, color=LIMIT, lw=1.0, ls=DASHES[1], label=label)
     head(axes, f"K_dyn = {run.k_dyn:.3f} in step {name_of(run.worst)}", f"torque, {units.label('N*m')}")
 
 

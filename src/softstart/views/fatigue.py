@@ -11,7 +11,16 @@ import numpy as np
 from softstart.drive import Machine, SNCurve
 from softstart.start.fatigue import HOURS_PER_YEAR, Fatigue, Life
 from softstart.start.metrics import REFERENCE
-from softstart.views.drawing import GREY, MARKERS, drawing, entitle, head, line_of, new_figure
+from softstart.views.drawing import (
+    GREY,
+    MARKERS,
+    drawing,
+    entitle,
+    head,
+    line_of,
+    new_figure,
+    strategy_colours,
+)
 from softstart.views.markdown import file_stem
 from softstart.views.numbers import DataColumn, TextTable, number, seen, short, titled, units_of
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file, rows_file
@@ -175,10 +184,11 @@ def fatigue_figure(found: Fatigue) -> Figure:
     """Ranges of the cycles of a start over their number, of the most damaged shaft; lives of all shafts."""
     runs = sorted(found.by_run, key=lambda rows: -min(row.relative for row in rows))
     names, units = [rows[0].run.controller_name for rows in runs], units_of(found.drive)
+    colours = strategy_colours(names)
     with drawing():
         figure, (left, right) = new_figure(1, 2, (9.0, 1.9 + 0.28 * max(6, len(runs))))
         for index, (rows, name) in enumerate(zip(runs, names, strict=True)):
-            line = line_of(index, dashed=True)
+            line = line_of(index, dashed=True) | {"color": colours[name][0]}
             spectrum = max(rows, key=lambda row: row.equivalent_torque).spectrum
             counts = np.concatenate([[0.5], np.cumsum(spectrum[:, 2])])
             ranges = np.concatenate([spectrum[:1, 0], spectrum[:, 0]])

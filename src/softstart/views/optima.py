@@ -14,7 +14,7 @@ from softstart.optimal.result import Optimum
 from softstart.start.metrics import REFERENCE
 from softstart.start.recommendation import margins_of
 from softstart.start.run import Run
-from softstart.views.drawing import COLOURS, DASHES, GREY, drawing, head, new_figure
+from softstart.views.drawing import COLOURS, DASHES, GREY, LIMIT, drawing, head, new_figure
 from softstart.views.numbers import (
     NOTHING,
     DataColumn,
@@ -284,7 +284,7 @@ def optimum_figure(best: Optimum) -> Figure:
             title += f", at least {best.bound.k_dyn:.4f}"
         if problem.k_dyn is not None:
             most = torque(problem.k_dyn * problem.base_torque)
-            axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
+            axes.axhline(most, color=LIMIT, lw=1.0, ls=DASHES[1], label="permissible")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))  # "15 % less" is seen as that
         head(axes, title, f"torque, {units.label('N*m')}")
 
@@ -414,10 +414,9 @@ def draw_front(axes: Axes, front: Front) -> None:
         (p.start_time_bound, p.k_dyn_lower_bound) for p in front.points if p.k_dyn_lower_bound is not None
     ]
     points = [
-        (one.name + ("" if one.ratio is None else f", x{one.ratio:.2f}"), one.start_time, one.k_dyn)
-        for one in front.controllers
-        if not math.isnan(one.start_time)
+        (one.name, one.start_time, one.k_dyn) for one in front.controllers if not math.isnan(one.start_time)
     ]
+    ratios = {one.name: f", x{one.ratio:.2f}" for one in front.controllers if one.ratio is not None}
     best, shortest = best_start(front.drive), front.shortest_start_time
     title = f"{front.drive.name}: {best_k_dyn(front.drive)}, terminal {front.terminal}"
     note = f"     (x: K_dyn over that of the {best} at the same start time)"
@@ -427,7 +426,7 @@ def draw_front(axes: Axes, front: Front) -> None:
                   transform=axes.get_xaxis_transform(), label=f"no {best}")  # fmt: skip
     if not math.isnan(shortest):
         axes.axvline(shortest, color=GREY, ls=DASHES[1], label=f"shortest found, {shortest:.4f} s")
-    draw_trade_off(axes, points, title=title, optima=optima, best=best, bound=bound, note=note)
+    draw_trade_off(axes, points, title=title, optima=optima, best=best, bound=bound, note=note, notes=ratios)
     axes.set_xlim(left=min([axes.get_xlim()[0], *(0.98 * t for t in refused)]))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from softstart.views.drawing import (
     COLOURS,
     DASHES,
     GREY,
+    LIMIT,
     SHAFTS,
     drawing,
     entitle,
@@ -27,6 +28,7 @@ from softstart.views.drawing import (
     panels,
     plain_ticks,
     shade_open_gap,
+    strategy_colours,
     verbatim,
 )
 from softstart.views.numbers import units_of
@@ -103,7 +105,7 @@ def permissible_line(axes: Axes, run: Run) -> None:
     """The permissible shaft torque, if there is one."""
     if not math.isnan(run.permissible_torque):
         most = units_of(run.drive).lossless.shown(run.permissible_torque, "N*m")
-        axes.axhline(most, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="permissible")
+        axes.axhline(most, color=LIMIT, lw=1.0, ls=DASHES[1], label="permissible")
 
 
 def speeds(axes: Axes, run: Run) -> None:
@@ -190,8 +192,9 @@ def before_after_figure(rows: Sequence[Row]) -> Figure:
     units, latest = units_of(machine), max(map(_shown_end, runs))
     with drawing():
         figure, (torque, speed) = new_figure(1, 2, (8.0, 3.2), width_ratios=(1.7, 1.0))
-        lines = ((COLOURS[1], 1.1), (COLOURS[0], 2.0))[-len(rows) :]
-        for row, run, (colour, width) in zip(rows, runs, lines, strict=True):
+        colours, widths = strategy_colours([row.name for row in rows]), (1.1, 2.0)[-len(rows) :]
+        for row, run, width in zip(rows, runs, widths, strict=True):
+            colour = colours[row.name][0]
             worst = run.T.reshape(run.t.size, -1)[:, run.worst_shaft]
             torque.plot(run.t, units.shown(worst, "N*m"), color=colour, lw=width, label=verbatim(row.name))
             peak = units.shown(float(run.trajectory.shafts["peak"][run.worst_shaft]), "N*m")
@@ -229,6 +232,7 @@ def draw_trade_off(
     best: str = "optimum",
     bound: Points = (),
     note: str = "",
+    notes: Mapping[str, str] | None = None,
     time: str = "start time",
 ) -> None:
     """The same on given axes, with optima and with the lower bound, below which no start is possible."""
@@ -243,7 +247,7 @@ def draw_trade_off(
         values.append(min(k))
     if optima:
         axes.plot(*zip(*optima, strict=True), "o-", ms=3.5, color=COLOURS[0], label=best, zorder=3)
-    mark_points(axes, points, filled)
+    mark_points(axes, points, filled, notes)
     axes.axhline(1.0, color=GREY, lw=0.8, ls=":")
     if times:
         room = max(max(times) - min(times), 1e-3 * max(times))

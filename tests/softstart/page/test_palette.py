@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 import softstart.page
+from softstart import compare
 from softstart.controller.finding import ready_controller_names
+from softstart.page.frames import FrameBuilder
+from softstart.page.session import Session
+from softstart.views.drawing import STRATEGIES
+from softstart.views.traces import trade_off_figure
 
 COLOURS = 12  # of strategies
 WEB = Path(softstart.page.__file__).parent / "web"
@@ -42,8 +47,12 @@ def seen(tone, sight):
 
 
 def palette(name):
-    text = (WEB / "modules" / "theme.js").read_text("utf-8")
-    return re.findall(r"#[0-9a-f]{6}", re.search(rf"const {name} = \[(.*?)\];", text)[1])
+    return [pair[["LIGHT", "DARK"].index(name)] for pair in STRATEGIES]
+
+
+def tones(name):
+    """Of this name in the style sheet, on light and dark paper."""
+    return re.findall(rf"--{name}: (#[0-9a-f]{{6}});", (WEB / "style.css").read_text("utf-8"))
 
 
 def contrast(tone, paper):
@@ -64,6 +73,24 @@ def test_any_two_strategies_are_told_apart(name, sight):
 
 @pytest.mark.parametrize("name", ["LIGHT", "DARK"])
 def test_lines_are_seen_on_the_paper(name):
-    papers = re.findall(r"--paper: (#[0-9a-f]{6});", (WEB / "style.css").read_text("utf-8"))
-    paper = papers[["LIGHT", "DARK"].index(name)]
+    paper = tones("paper")[["LIGHT", "DARK"].index(name)]
     assert min(contrast(tone, paper) for tone in palette(name)) >= 3.0  # WCAG 2.2, 1.4.11
+
+
+@pytest.mark.parametrize("name", ["LIGHT", "DARK"])
+@pytest.mark.parametrize("other", ["warn", "ink"])
+def test_no_strategy_looks_like_a_limit_or_the_motor_torque(name, other):
+    """Red is an error, a limit, and what exceeds it; the torque of the motor is drawn in ink."""
+    one = seen(tones(other)[["LIGHT", "DARK"].index(name)], "full")
+    assert min(float(np.linalg.norm(seen(tone, "full") - one)) for tone in palette(name)) > 6.5 * NOTICED
+
+
+def test_a_strategy_has_the_same_colour_wherever_it_is_drawn():
+    import matplotlib.colors
+
+    found = compare("crane-4amtkf", ["ramp", "direct"])
+    figure = trade_off_figure([(row.name, 1.0, row.run.k_dyn) for row in found.rows])
+    drawn = {line.get_label(): matplotlib.colors.to_hex(line.get_color()) for line in figure.axes[0].lines}
+    colours = FrameBuilder(Session()).main_frame()["colours"]
+    for name in ("ramp", "direct"):
+        assert drawn[name] == colours[name][0]

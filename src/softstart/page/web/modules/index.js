@@ -80,6 +80,7 @@ export class Instrument {
       const { shown, added, changed, selected, stamp, here, angle, inertia, torque, at_time } = frame;
       const reference = frame.reference && { trace: state.reference?.trace, ...frame.reference };
       Object.assign(state, { order, shown, added, changed, selected, stamp, here, angle, inertia, torque, fields, reference, at_time, soft: frame.soft });
+      if (frame.colours) state.colours = frame.colours;
       this.plotted = false;
       this.steps.show(frame.steps);
       this.shaft.show(frame);

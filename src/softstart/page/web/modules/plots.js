@@ -194,9 +194,9 @@ export class Plots {
     return {
       main,
       many: main?.shafts?.length > 1,
-      others: names.map((name) => ({ name, trace: one(name), colour: theme.strategy(state.order.indexOf(name)) })),
+      others: names.map((name) => ({ name, trace: one(name), colour: theme.strategy(state.colours[name]) })),
       reference: state.reference?.trace?.T ? state.reference.trace : null,
-      own: theme.strategy(state.order.indexOf(state.selected)),
+      own: theme.strategy(state.colours[state.selected]),
     };
   }
 

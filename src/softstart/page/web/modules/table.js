@@ -87,7 +87,7 @@ export class Table {
       line.changed.hidden = !state.changed.includes(name);
       if (line.asked <= state.stamp) line.asked = -1; // the server knows what was pressed last
       if (line.asked < 0) line.eye.checked = state.shown.includes(name);
-      line.tr.style.setProperty("--colour", this.theme.strategy(state.order.indexOf(name)));
+      line.tr.style.setProperty("--colour", this.theme.strategy(state.colours[name]));
       if (!row || line.row === row) continue;
       line.row = row;
       line.cells.forEach((cell, index) => put(cell, FIGURES[index][3](row)));

@@ -4,11 +4,6 @@ import { element, stored } from "./numbers.js";
 const CHOICES = [["auto", "Auto"], ["light", "Light"], ["dark", "Dark"]];
 const KEY = "softstart-colours";
 
-// each has one hue in light and dark; the least difference of two, with full sight before all, with any colour blindness
-// too, is as large as a search for twelve found (tests/softstart/page/test_palette.py)
-const LIGHT = ["#2a9393", "#ba8a49", "#2526e3", "#922544", "#597203", "#c4505b", "#9b4bae", "#1f4e01", "#f64cc2", "#9682f7", "#610157", "#671ba9"];
-const DARK = ["#6ac2c1", "#e3970d", "#3753fe", "#fe4179", "#b3d26f", "#955054", "#eea8ff", "#84fe41", "#c00093", "#967ffe", "#b37fa9", "#844fc3"];
-
 export class Theme {
   constructor(place, changed) {
     this.changed = changed;
@@ -39,10 +34,9 @@ export class Theme {
     this.changed();
   }
 
-  // the colour of a strategy is that of its place in the table as it was made
-  strategy(index) {
-    const palette = this.dark ? DARK : LIGHT;
-    return palette[index % palette.length];
+  // of its colours on light and on dark paper, as the server tells them
+  strategy(colours) {
+    return colours[this.dark ? 1 : 0];
   }
 
   end() {
