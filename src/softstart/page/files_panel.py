@@ -199,7 +199,7 @@ class ParameterSheetPanel(JobPanel):
     about = (
         "What to set on the inverter for the selected strategy, tuned gains too: rounded values in its "
         "units, with the K_dyn of exactly these. Where the strategy does not keep the limits as it is, it is "
-        "set for them. It takes about a second."
+        "set for them."
     )
     verb = "Parameter sheet"
 
@@ -213,6 +213,10 @@ class ParameterSheetPanel(JobPanel):
         name = file_name(inputs.machine.name, inputs.selected, "parameters", suffix=".txt")
         return tasks.sheet_task, inputs.both_ends, inputs.controllers[inputs.selected], name
 
+    def estimate(self) -> float:
+        """Some starts."""
+        return 2.0
+
 
 class ProgramPanel(JobPanel):
     """The selected strategy as a program, or the machine as FMU, saved in the tab that has asked for it."""
@@ -220,7 +224,7 @@ class ProgramPanel(JobPanel):
     name = "program"
     about = (
         "The selected strategy with its guard, tuned gains too, as a program for a PLC, an inverter or a "
-        "simulator; with instructions, and a test by real starts. It takes a few seconds."
+        "simulator; with instructions, and a test by real starts."
     )
     verb = "Program ZIP"
     saves = True
@@ -244,6 +248,10 @@ class ProgramPanel(JobPanel):
         controller = None if of_machine else inputs.controllers[inputs.selected]
         return tasks.program_task, inputs.machine, controller, kind, str(self._real.value), file
 
+    def estimate(self) -> float:
+        """Translation and some starts in cycles."""
+        return 5.0
+
 
 class ReportPanel(JobPanel):
     """The report for a customer, saved in the tab that has asked for it."""
@@ -251,7 +259,7 @@ class ReportPanel(JobPanel):
     name = "report"
     about = (
         "The report is one file that opens offline and prints: drive, strategies, limit, robustness, "
-        "parameter sheet. It takes a while and is computed in the background."
+        "parameter sheet."
     )
     verb = "Report HTML"
     saves = True
@@ -266,6 +274,10 @@ class ReportPanel(JobPanel):
         name = file_name(inputs.machine.name, "report", suffix=".html")
         command = command_text(inputs.machine_with_duty, inputs.controllers, "report", f"--out={name}")
         return tasks.report_task, inputs.both_ends_with_duty, list(inputs.controllers.values()), command, name
+
+    def estimate(self) -> float:
+        """Mostly its budget for maps and limits."""
+        return 30.0
 
 
 def command_line(session: Session, user: Hashable) -> None:

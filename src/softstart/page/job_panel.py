@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Hashable
+from contextlib import suppress
 from functools import cache, partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -74,6 +75,8 @@ class JobPanel(ABC):
     # in the tab that has started the job, as soon as it is done: are its controllers added, its files saved
     adds: ClassVar[bool] = False
     saves: ClassVar[bool] = False
+    # by panel: how much longer than estimated the last job took on this server
+    took: ClassVar[dict[str, float]] = {}
 
     def __init__(self, session: Session, user: Hashable, jobs: Jobs | None = None) -> None:
         self.session, self._user, self._jobs = session, user, jobs or jobs_of(user)
@@ -86,6 +89,7 @@ class JobPanel(ABC):
             if self.verb:
                 self.go = action(self.verb, self.start, f"{self.name}-go", main=True)
         self._hint = hint(self.about)
+        self._takes = ui.label().classes("panel-hint").props(f'data-testid="{self.name}-takes"')
         with box("job") as self._box:
             self._line = ui.label().classes("job-line")
             self._line.props(f'role=status aria-live=polite data-testid="{self.name}-state"')
@@ -112,6 +116,10 @@ class JobPanel(ABC):
     def task(self) -> Task:
         """What is computed."""
 
+    @abstractmethod
+    def estimate(self) -> float:
+        """About how many seconds it takes, on a processor of 2020; InputError for a wrong field."""
+
     @property
     def mine(self) -> bool:
         """Whether the job was started in this tab."""
@@ -132,9 +140,16 @@ class JobPanel(ABC):
         except InputError as error:
             self.refuse(error)
             return
-        self._started.machine = self.session.inputs.machine
+        self._started.machine, self._started.estimate = self.session.inputs.machine, self.estimate()
         self._jobs.show(self._user, self.name, self._started)
         self.refresh()
+
+    def takes(self) -> str:
+        """About how long it takes, by the last job of this kind on this server; "" for wrong fields."""
+        with suppress(InputError):
+            seconds = self.estimate() * self.took.get(self.name, 1.0)
+            return f"Takes about {duration(float(f'{max(seconds, 1.0):.1g}'))}; can be cancelled."
+        return ""
 
     def refuse(self, error: InputError) -> None:
         """Show why nothing was started."""
@@ -154,6 +169,7 @@ class JobPanel(ABC):
     def refresh(self) -> None:
         """Show the state of the job, its result once it is there, and whether that is of another machine."""
         job = self._jobs.shown(self._user, self.name)
+        self._takes.set_text("" if job is not None and not job.state.over else self.takes())
         if job is None:
             return
         if job is not self.job:  # started here or in another tab
@@ -176,6 +192,7 @@ class JobPanel(ABC):
             self._result_box.set_visibility(False)
         if state is JobState.DONE and self._result is None:
             self._result = job.result
+            self.took[self.name] = job.seconds / job.estimate
             self.show(job.result)
         self._compare(job)
 

@@ -44,7 +44,7 @@ class Job:
 
     `share` is how much is done, 0 to 1, or None where that is not known; `message` what is being done;
     `result` what came out; `sentences` why there is no result.
-    `state` is set last. `machine` is for those who show it: that of the result.
+    `state` is set last. `machine` is for those who show it: that of the result; so is `estimate`, in s.
     """
 
     def __init__(self, user: Hashable, title: str, packed: bytes, ahead: Callable[[Job], int]) -> None:
@@ -55,6 +55,7 @@ class Job:
         self.result: Any = None
         self.sentences: tuple[str, ...] = ()
         self.machine: Machine | None = None
+        self.estimate = 1.0
         self.pid: int | None = None
         self._stop = threading.Event()
         self._lock = threading.Lock()

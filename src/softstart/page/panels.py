@@ -8,6 +8,7 @@ from softstart.controller.finding import controller_class
 from softstart.controller.parameters import declared_parameters
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
+from softstart.optimal.front import COUNT
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks
 from softstart.page.job_panel import JobPanel, Task
@@ -45,6 +46,10 @@ class OptimumPanel(JobPanel):
         StartTime.of(text, "Start time")
         return tasks.optimum_task, self.session.inputs.machine_in_units, text, self.end.value
 
+    def estimate(self) -> float:
+        """More for an unknown position, and for a chain."""
+        return optimum_seconds(self.session.inputs.machine)
+
 
 class LimitPanel(JobPanel):
     """The least K_dyn over the start time, the strategies beside it."""
@@ -64,6 +69,10 @@ class LimitPanel(JobPanel):
         inputs = self.session.inputs
         return tasks.curve, inputs.machine_in_units, list(inputs.controllers.values()), self.end.value
 
+    def estimate(self) -> float:
+        """An optimum for each start time, and for that of each strategy."""
+        return (COUNT + len(self.session.inputs.controllers)) * optimum_seconds(self.session.inputs.machine)
+
 
 class ChecksPanel(JobPanel):
     """Start positions, limits and life of all strategies, and the quickest start within limits."""
@@ -78,6 +87,11 @@ class ChecksPanel(JobPanel):
         """All checks."""
         inputs = self.session.inputs
         return tasks.checked, inputs.both_ends, dict(inputs.controllers)
+
+    def estimate(self) -> float:
+        """With limits the quickest start that keeps them takes longest."""
+        machine = self.session.inputs.machine
+        return 3.0 + (5.0 * optimum_seconds(machine) if machine.limits else 0.0)
 
 
 class TuningPanel(JobPanel):
@@ -109,6 +123,20 @@ class TuningPanel(JobPanel):
         grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
         more = bool(self.certified.value), int(self.searches.value)
         return tasks.tuning, self.session.inputs.both_ends, name, *grid, *more
+
+    def estimate(self) -> float:
+        """In proportion to cells, searches and start positions."""
+        machine = self.session.inputs.machine
+        gaps, inertias = grid_of(machine, str(self.gaps.value), str(self.inertias.value))
+        cell = float(self.searches.value) * len(machine.positions)
+        cell += optimum_seconds(machine) if self.certified.value else 0.0
+        return len(gaps) * len(inertias) * cell
+
+
+def optimum_seconds(machine: Machine) -> float:
+    """About how long one optimum takes."""
+    positions = len(machine.positions)
+    return 1.6 * positions**1.3 * (1.0 if len(machine.shaft_names) == 1 else 20.0)
 
 
 def tunable_controllers() -> list[str]:
@@ -191,3 +219,7 @@ class LogPanel(JobPanel):
         columns = tasks.columns_of(str(self.columns.value or ""))
         guess, kind = self.session.inputs.machine_in_units, str(self.torque_is.value)
         return tasks.identified, content, name, guess, kind, columns
+
+    def estimate(self) -> float:
+        """Hardly longer for a long log."""
+        return 5.0

@@ -76,7 +76,9 @@ def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progres
     from softstart.views.optima import optimum_sheet
 
     progress(None, "minimising K_dyn")
-    best = optimize(drive, start_time, terminal=terminal)
+    best = optimize(
+        drive, start_time, terminal=terminal, progress=lambda doing: progress(counted(doing), doing)
+    )
     others = []
     for name in ready_controller_names():
         with suppress(InputError, SimulationError):
@@ -191,9 +193,18 @@ def tuning_share(doing: str) -> float | None:
     """
     for begin, (low, high) in TUNING_SHARES.items():
         if doing.startswith(begin):
-            counted = re.search(r"(\d+) of (\d+)", doing)
-            return low + (high - low) * (int(counted[1]) / int(counted[2]) if counted else 0.0)
+            return low + (high - low) * (counted(doing) or 0.0)
     return None
+
+
+def counted(doing: str) -> float | None:
+    """How much is done by what a message counts.
+
+    >>> counted("start 3 of 15 around the best one"), counted("mid-gap alone: K_dyn 0.865")
+    (0.2, None)
+    """
+    found = re.search(r"(\d+) of (\d+)", doing)
+    return int(found[1]) / int(found[2]) if found else None
 
 
 def columns_of(text: str) -> dict[str, str]:

@@ -40,7 +40,7 @@ class Hasty:
         self._state, self.result, self.sentences = JobState.RUNNING, None, ()
         self.share, self.message, self.ahead, self.stopping = None, "", 0, False
         self.looks, self.clock = -1, itertools.count()
-        self.machine = None
+        self.machine, self.estimate = None, 1.0
 
     @property
     def seconds(self) -> float:
@@ -73,6 +73,9 @@ def panel_of(jobs: Jobs, user: str = "A") -> Any:
         def task(self) -> tuple[Any, ...]:
             return (print,)
 
+        def estimate(self) -> float:
+            return 20.0
+
         def show(self, result: TaskResult) -> None:
             super().show(result)
             given.append(result.html)
@@ -81,6 +84,21 @@ def panel_of(jobs: Jobs, user: str = "A") -> Any:
     panel = Panel(Session(controllers=["direct"]), user, jobs)
     panel.given = given
     return panel
+
+
+def test_a_panel_tells_beforehand_how_long_it_takes(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As estimated; then as the last job took, whose estimate was 20 s and which took half a minute."""
+    from softstart.page.job_panel import JobPanel
+
+    monkeypatch.setattr(JobPanel, "took", {})
+    panel = panel_of(Queue())
+    assert panel.takes() == "Takes about 20 s; can be cancelled."
+    panel.start()
+    assert panel._takes.text == ""  # its state says how long it has taken
+    monkeypatch.setattr(Hasty, "seconds", 30.0)
+    panel.job.end()
+    panel.refresh()
+    assert panel.takes() == "Takes about 30 s; can be cancelled."
 
 
 @pytest.mark.parametrize("looks", [1, 2, 3, 4, 5])
