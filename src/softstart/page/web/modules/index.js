@@ -17,7 +17,7 @@ const KEY = "softstart-inputs";
 export class Instrument {
   constructor(root, send) {
     this.send = send;
-    this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "", stamp: 0 };
+    this.state = { rows: new Map(), traces: new Map(), order: [], shown: [], selected: "", colours: {}, stamp: 0 };
     this.waiting = 0;
     const part = (name) => root.querySelector(`.${name}`);
     const say = (message) => this.say(message);

@@ -35,7 +35,7 @@ export class Theme {
   }
 
   // of its colours on light and on dark paper, as the server tells them
-  strategy(colours) {
+  strategy(colours = []) {
     return colours[this.dark ? 1 : 0];
   }
 
