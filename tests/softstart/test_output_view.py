@@ -3,6 +3,7 @@
 A gear changes no start, only what is seen: the results of one machine are seen through 50 random gears.
 """
 
+import html
 import math
 import re
 from functools import cache
@@ -11,10 +12,22 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from softstart import Chain, Drive, InputError, compare, fatigue, optimize, scenarios_of, simulate, tune
+from softstart import (
+    Chain,
+    Drive,
+    InputError,
+    compare,
+    fatigue,
+    optimize,
+    report,
+    scenarios_of,
+    simulate,
+    tune,
+)
 from softstart.cli.main import main
 from softstart.input.gear import NO_GEAR, NO_OUTPUT, Gear
 from softstart.quantities import RefusedError
+from softstart.reporting.document import data_of, strategies
 from softstart.views.fatigue import fatigue_tables
 from softstart.views.numbers import TextTable, seen_at
 from softstart.views.optima import optimum_sheet, scenario_table
@@ -50,6 +63,7 @@ def results() -> SimpleNamespace:
         comparison=compare(drive, ["direct", "ramp", "shaped"]),
         lives=fatigue([simulate(drive, one) for one in ("direct", "ramp")]),
         best=optimize(drive, 0.4),
+        report=report(drive, controllers=["ramp"], budget=0.0),
         tuning=tune(drive, "reduced-first-stage", ["0.5x", "1x"], ["1x", "2x"], free=["torque"], **QUICK),
     )
 
@@ -94,7 +108,8 @@ def test_every_value_is_that_of_json_through_the_gear(gear: Gear, units: str) ->
     found = results()
     machines = [found.drive, *(one.drive for one in (found.run, found.comparison, found.lives, found.tuning))]
     machines += [row.run.drive for row in found.comparison.rows]
-    machines += [found.best.run.drive, found.best.problem.drive]
+    machines += [found.best.run.drive, found.best.problem.drive, found.report.drive]
+    machines += [row.run.drive for row in found.report.comparison.rows]
     for one in machines:
         through(found, one, gear, f"{units}, at output")
     # the machine
@@ -148,6 +163,38 @@ def test_every_value_is_that_of_json_through_the_gear(gear: Gear, units: str) ->
     unit = columns(robust)["unit"][1][0]
     shown = float(columns(robust)["robust"][1][0])
     assert shown == pytest.approx(there(gear, unit, found.tuning.robust.gains["torque"]), rel=5.1e-6)
+    # report
+    heads, data, _ = data_of(found.report)
+    assert heads.endswith("|#at the motor shaft")
+    given = {row[1]: row[2:] for row in data}
+    for symbol, si in (("J1", "kg*m^2"), ("Ms", "N*m"), ("c", "N*m/rad"), ("gap", "rad"), ("J2", "kg*m^2")):
+        text, of, motor = given[symbol]
+        value = getattr(drive, symbol)
+        size = SIZES[of.removesuffix("/rad").replace("²", "2")]
+        assert float(text) == pytest.approx(gear.to_output(value, si) / size, rel=5.1e-6)
+        assert float(motor.split()[0]) == pytest.approx(value, rel=5.1e-4)
+    limit = next(row for row in data if row[0].startswith("permissible peak"))
+    assert float(limit[2]) == pytest.approx(permitted / SIZES[limit[3]], rel=5.1e-6)
+    peaks = sorted(found.report.summary()["strategies"], key=lambda one: one["k_dyn"])
+    check(strategies(found.report), "peak", gear, [one["peak_torque"] for one in peaks])
+
+
+def test_the_report_says_the_shaft_once_in_each_part() -> None:
+    """The whole page at the output: numbers of the first page, captions, and the sheet in its own units."""
+    drive = results().drive.replace(
+        gear_ratio=38.1, gear_efficiency=0.95, units="arcmin, rpm, kN m, at output"
+    )
+    made = report(drive, controllers=["ramp"], budget=0.0)
+    page = re.sub(r"<style.*?</style>|<svg class=.plot.*?</svg>", "", made.to_html(), flags=re.DOTALL)
+    text = " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
+    peak = made.choice.chosen.run.peak_torque * 38.1 * 0.95 / 1000.0
+    assert f"peak shaft torque, at the output {peak:.3f} kN m" in text
+    for part in ("Effort and result", "Strategies on this drive, by K dyn"):
+        assert f"{part} , at the output" in text or f"{part}, at the output" in text
+    assert "Data of the drive, at the output shaft" in text
+    assert "everything brought to the output shaft" in text
+    assert "at the output, N m" not in text
+    assert re.search(r"parameter sheets: the [a-z ]+, [0-9.]+ N m at the motor shaft", text)
 
 
 def shown_of(drive: Drive) -> list[object]:

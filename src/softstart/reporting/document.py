@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from matplotlib.patches import Rectangle
 from softstart.drive import Drive, Machine, plausibility
 from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
+from softstart.quantities import Units
 from softstart.reporting import choice, limit, sheet_view
 from softstart.reporting.inverters import inverters
 from softstart.start import fatigue
@@ -42,6 +43,7 @@ from softstart.views.numbers import (
     printed,
     short,
     unit,
+    units_for,
     units_of,
 )
 from softstart.views.optima import REACTS, best_start
@@ -74,7 +76,9 @@ FUNCTIONS = {
     "ramp": "ramp and S-curve of the speed reference",
     "preload": "torque before the brake opens, and its ramp",
 }
-_BEFORE_UNIT = re.compile(r"(?<=[\d,]) (?=(?:N\xa0m|kg\xa0m|ms|s|rad|deg|rpm|mm|Hz|kW|W|%)(?!\w))")
+_BEFORE_UNIT = re.compile(
+    r"(?<=[\d,]) (?=(?:k?N\xa0m|kg\xa0m|lbf|ms|s|rad|deg|arcmin|rpm|mm|Hz|kW|W|%)(?!\w))"
+)
 _DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
 
 
@@ -86,7 +90,7 @@ def typeset(text: object, comma: bool = False) -> Markup:
     """
     if isinstance(text, Markup):
         return text
-    shown = re.sub(r"\b(N|kg) m(?=\b|²)", "\\1\xa0m", "" if text is None else str(escape(text)))
+    shown = re.sub(r"\b(k?N|kg) m(?=\b|²)", "\\1\xa0m", "" if text is None else str(escape(text)))
     shown = with_comma(_BEFORE_UNIT.sub("\xa0", shown), comma)
     return Markup(shown.replace("K_dyn", "K<sub>dyn</sub>"))
 
@@ -134,10 +138,20 @@ def view(comma: bool, shown: TextTable, look: str = "", strong: Sequence[str] = 
     return Markup(f'<div class="wide">{cells}</div>')
 
 
+def seen(value: float, units: Units, si: str, text: Callable[[float], str] = digits) -> str:
+    """A value in SI at the motor shaft as it is seen, with its unit as a page has it.
+
+    >>> seen(1500.0, Units(torque="kN*m"), "N*m/rad")
+    '1.500 kN m/rad'
+    """
+    return f"{text(float(units.shown(value, si)))} {unit(units.of(si))}"
+
+
 FILTERS = {
     "digits": digits, "fixed": fixed, "short": lambda value: printed(short(value)),
     "percent": percent, "listed": listed, "times": times, "factor": lives.factor,
-    "printed": printed, "fact": fact_of,
+    "printed": printed, "fact": fact_of, "seen": seen,
+    "exact": lambda value, units, si: seen(value, units, si, lambda one: printed(short(one))),
     "css_string": css_string,
     "capital": lambda text: text[0].upper() + text[1:], "short3": lambda value: f"{value:.3g}",
     "short4": lambda value: printed(short(float(f"{value:.4g}"))),
@@ -166,7 +180,7 @@ def text_answer(report: Report) -> str:
 def document(report: Report) -> str:
     """The whole file."""
     drive, comma, positions = report.drive, report.project.decimal == "comma", list(report.drive.positions)
-    plain = templates()
+    plain, units = templates(), units_of(report.drive)
 
     @pass_context  # else constants are escaped before they come here
     def finalize(_: object, text: object) -> Markup:
@@ -181,9 +195,7 @@ def document(report: Report) -> str:
         return Markup(re.sub(r">[^<]+<", lambda found: with_comma(found[0], comma), text))
 
     def scheme() -> Markup:
-        return in_page(
-            plain.get_template("scheme.svg.j2").render(drive=drive, units=units_of(drive).at_motor)
-        )
+        return in_page(plain.get_template("scheme.svg.j2").render(drive=drive, units=units))
 
     several, what = len(drive.shaft_names) > 1, drive.WHAT.removeprefix("a ")
     asked = several or drive.limits.fatigue is not None  # for lives
@@ -211,11 +223,10 @@ def document(report: Report) -> str:
         "no_lives": report.lives if asked and not lasts else "",
         "project": report.project, "sections": [(key, title) for key, title in sections.items() if title],
         "several": several, "few": len(drive.shaft_names) <= MOST_SHAFTS,
-        "geared": drive.gear is not None, "gear_in_words": gear_in_words(drive),
+        "geared": drive.gear is not None and not units.gear, "gear_in_words": gear_in_words(drive),
         "shown": report.choice.shown, "cases": list(report.comparison.rows[0].worst_case),
         "ends": starts.both_ends(report.comparison),
-        "plausibility_warnings": plausibility.plausibility_warnings(drive), "units": units_of(drive).at_motor,
-        "most_torque": report.most_torque,
+        "plausibility_warnings": plausibility.plausibility_warnings(drive), "units": units,
         "rated": rated_torque(drive.design_drive), "shown_until": traces.shown_until(report.ordered),
         "position": positions[0] if len(positions) == 1 else "unknown",
         "natural_vibration": natural_vibration,
@@ -226,7 +237,7 @@ def document(report: Report) -> str:
         "at_output": at_output, "best_start": best_start, "traces": traces, "limit_figure": limit_figure,
         "maps_figure": maps_figure, "starts": starts,
         "chains": chains, "beside": beside, "lives": lives, "duties": duties, "duty_steps": duty_steps,
-        "output": "|#at the output, N m" if drive.gear else "",
+        "output": f"|#at the output, {units.label('N*m')}" if drive.gear and not units.gear else "",
         "strategies": strategies, "equal_time": equal_time,
         "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
         "drive_lines": drives.drive_lines, "curves": list(drives.curves(drive)),
@@ -253,11 +264,11 @@ def limit_figure(report: Report) -> Figure:
 
 def maps_figure(report: Report) -> Figure:
     """K_dyn over gap and load inertia, one map a strategy, all in one scale of colours."""
-    drive, units = report.drive.design_drive, units_of(report.drive).at_motor
+    drive, units = report.drive.design_drive, units_of(report.drive)
     maps = {row.name: report.choice.maps[row.name] for row in report.choice.mapped}
     first = next(iter(maps.values()))
     gaps = [f"{units.shown(gap, 'rad'):.4g}" for gap in first.gaps]
-    inertias = [f"{inertia:.3g}" for inertia in first.inertias]
+    inertias = [f"{units.shown(inertia, 'kg*m^2'):.3g}" for inertia in first.inertias]
     # the cell of the drive as it is
     i, j = (
         min(range(len(axis)), key=lambda k: abs(axis[k] - value))
@@ -266,7 +277,9 @@ def maps_figure(report: Report) -> Figure:
     scale = colour_scale(*(one.k_dyn for one in maps.values()))
     with drawing():
         size = (3.5, 0.7 + 0.22 * max(len(gaps), 2))
-        figure, axes = panels(len(maps), size, 2, "load inertia J2, kg m²", f"gap, {units.angle}")
+        figure, axes = panels(
+            len(maps), size, 2, f"load inertia J2{units.at}, kg m²", f"gap{units.at}, {units.angle}"
+        )
         for panel, (name, one) in zip(axes, maps.items(), strict=True):
             heat_map(panel, inertias, gaps, one.k_dyn, scale, decimals=2)
             box = Rectangle((j - 0.5, i - 0.5), 1.0, 1.0, fc="none", ec=COLOURS[1], lw=2.0, zorder=5)
@@ -278,10 +291,12 @@ def maps_figure(report: Report) -> Figure:
 
 def strategies(report: Report) -> TextTable:
     """The figures of all strategies, by K_dyn."""
-    rows, gear = report.ordered, report.drive.gear
-    output = DataColumn("at the\noutput\nN m", lambda row: row.run.peak_torque_at_output)
+    rows, gear, units = report.ordered, report.drive.gear, units_of(report.drive)
+    there = units._replace(gear=gear)
+    heading = f"at the\noutput\n{units.label('N*m')}"
+    output = DataColumn(heading, lambda row: there.shown(row.run.peak_torque, "N*m"))
     shown = (
-        *starts.PEAK_COLUMNS, *([output] if gear else []), *starts.of_the_unknown(rows),
+        *starts.PEAK_COLUMNS, *([output] if gear and not units.gear else []), *starts.of_the_unknown(rows),
         starts.START_TIME, *starts.TIME_COLUMNS, starts.CONTACTS,
     )  # fmt: skip
     # a digit more than a terminal holds
@@ -331,7 +346,7 @@ def of_part(drive: Machine, path: str, parameter: Parameter) -> str:
 
 def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
     """What is known of the drive and from where: heads and rows of the table, and what is absent."""
-    project, units, gear = report.project, units_of(report.drive).at_motor, report.drive.gear
+    project, gear, at_output = report.project, report.drive.gear, bool(units_of(report.drive).gear)
     rows, absent = list[list[str]](), list[str]()
     for path, (parameter, value) in report.drive.parameters_by_path().items():
         if parameter.table in OWN_SECTION:
@@ -342,6 +357,7 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         if value == parameter.default and not source:
             absent += [meaning] if value == 0.0 else []
             continue
+        units = units_for(report.drive, parameter)
         of, other, text, there = unit(units.of(si)), "", str(value), ""
         values = value if isinstance(value, tuple) else (value,)
         exact = [v for v in values if isinstance(v, float)]
@@ -349,18 +365,22 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         if numbers:
             text, there = ", ".join(map(short, numbers)), there_of(report.drive, parameter, numbers)
             if gear is not None and parameter.at_output == "here":  # and the motor shaft is the other one
-                text, there = short(gear.lossless.to_motor(numbers[0], si)), text
+                exact = [gear.lossless.to_motor(exact[0], si)]
+                text, there = (text if at_output else short(gear.lossless.to_motor(numbers[0], si))), text
+        moved = units.is_at_output(si) or (at_output and parameter.at_output == "here")
         if path == "limits.life":
             hours = value / 3600.0
             text, of, other = digits(hours / fatigue.HOURS_PER_YEAR, 3), "years", f"{short(hours)} h"
-        elif numbers and of != unit(si):
+        elif numbers and (of != unit(si) or moved):
             other = f"{', '.join(map(digits, exact))} {unit(si)}"
         elif numbers and si == "rad/s":
             other = f"{', '.join(short(float(f'{v * RPM:.6g}')) for v in exact)} rpm"
         elif numbers and si == "rad":
             other = ", ".join(f"{short(float(f'{math.degrees(v):.4g}'))}°" for v in exact)
+        meaning = meaning.replace(" at the motor shaft", "") if at_output else meaning
         cells = [meaning, parameter.symbol, text, of if numbers else "", other]
-        cells += [f"{there} {of}" if there else ""] if gear else []
+        cells += [f"{there} {of}" if there else ""] if gear and not at_output else []
         rows.append([*cells, source or "not stated"] if project.sources else cells)
-    heads = "parameter|symbol|#value|unit|#that is" + ("|#at the output shaft" if gear else "")
+    heads = f"parameter|symbol|#value|unit|#{'at the motor shaft' if at_output else 'that is'}"
+    heads += "|#at the output shaft" if gear and not at_output else ""
     return heads + ("|source" if project.sources else ""), rows, absent

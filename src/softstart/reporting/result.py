@@ -13,7 +13,7 @@ from functools import cached_property, partial
 from importlib.metadata import PackageNotFoundError, requires, version
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from softstart import __version__
 from softstart.chain.machines import MachineLike, as_machine
@@ -48,7 +48,7 @@ from softstart.start.recommendation import Row
 from softstart.start.resolution import Resolution
 from softstart.start.run import Run
 from softstart.start.simulation import simulate
-from softstart.views.numbers import DASH, percent
+from softstart.views.numbers import DASH, percent, printed, short, units_of
 from softstart.views.sheet import Sheet
 from softstart.views.starts import both_ends, machine_lines
 
@@ -220,10 +220,12 @@ class Report(Result):
         return percent(saved, 0 if abs(saved) >= 0.1 else 1)
 
     @property
-    def most_torque(self) -> float:
-        """The largest torque of the motor within the bound, N m."""
-        motor: Any = self.drive.motor
-        return float(min(motor.starting_torque, motor.maximum_torque))
+    def torques(self) -> str:
+        """The torques of the motor within the bound, as the machine is seen: "0 to 62 N m"."""
+        motor, units = cast("Any", self.drive.motor), units_of(self.drive)
+        ends = motor.minimum_torque, min(motor.starting_torque, motor.maximum_torque)
+        low, high = (printed(short(float(units.shown(float(end), "N*m")))) for end in ends)
+        return f"{low} to {high} {units.label('N*m')}"
 
     @property
     def answer(self) -> str:

@@ -88,7 +88,7 @@ def starts(sheet: ParameterSheet) -> TextTable:
         f"peak torque{units.at}\n{units.label('N*m')}": column_of([units.shown(p, "N*m") for p in peaks]),
     }
     if sheet.drive.gear and not units.gear:
-        columns["at the output\nN m"] = [at_output(sheet.drive, peak) for peak in peaks]
+        columns[f"at the output\n{units.label('N*m')}"] = [at_output(sheet.drive, peak) for peak in peaks]
     columns[f"{exact.limited_name}\ns"] = column_of([time for *_, time in found], 5)
     return TextTable.of(f"{sheet.name}: started again after rounding", columns, ["start with"])
 

@@ -350,7 +350,7 @@ _read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a fr
 def at_output(machine: Machine, value: float, unit: str = "N*m") -> str:
     """A value of the motor shaft at the output of the gear, see `Drive.gear`; "" where it has none there.
 
-    The `unit` is that of the parameter; the value may be in another one of its kind.
+    The `unit` is that of the value in SI; it is shown in the units of the machine.
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0, gear_efficiency=0.95)
@@ -360,7 +360,7 @@ def at_output(machine: Machine, value: float, unit: str = "N*m") -> str:
     gear = machine.gear
     if gear is None or gear.factor(unit) is None:
         return ""
-    return digits(float(gear.to_output(value, unit)))
+    return digits(float(units_of(machine)._replace(gear=gear).shown(value, unit)))
 
 
 def gear_in_words(machine: Machine) -> str:

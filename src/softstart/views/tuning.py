@@ -333,7 +333,8 @@ def tuning_notes(tuning: Tuning) -> list[str]:
             for axis, unit in ((q.gaps, "rad"), (q.load_inertias, "kg*m^2"))
         )
         notes.append(
-            f"Gaps at the output: {gaps} rad, load inertias there: {inertias} kg m2. {gear_in_words(drive)}"
+            f"Gaps at the output: {gaps} {units_of(drive).label('rad')}, load inertias there: {inertias} "
+            f"kg m2. {gear_in_words(drive)}"
         )
     return [*notes, *([f"{plural(tuning.starts, noun)}."] if tuning.starts else [])]
 
