@@ -24,6 +24,7 @@ from softstart.start.results import limited_time
 GAPS = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)  # of the drive's own
 INERTIAS = (0.4, 0.6, 0.8, 1.0, 1.25)
 MOST_MAPS = 4
+SAME = 0.005  # a peak within this share of another is the same
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -153,6 +154,24 @@ class Choice(OneLine):
         known = {row: share for row, share in shares.items() if not math.isnan(share)}
         best = self.chosen or max(known, key=lambda row: known[row], default=self.direct)
         return list(dict.fromkeys([self.direct, best]))
+
+    @property
+    def more_effort(self) -> list[Row]:
+        """Direct, the chosen one, and the best of each class of effort that is below all simpler ones.
+
+        With limits the best of those that keep them, if any does.
+        """
+        limits, able = self.recommendation.limits, [row for row in self._able if not row.flags]
+        able = [row for row in able if keeps(row, limits)] or able
+        found = [self.direct, *([self.chosen] if self.chosen else [])]
+        lowest = self.direct.run.k_dyn
+        for effort in Effort:
+            rows = [row for row in able if row.effort is effort]
+            best = min(rows, key=lambda row: row.run.k_dyn, default=None)
+            if best is not None and best.run.k_dyn < (1.0 - SAME) * lowest:
+                found.append(best)
+                lowest = best.run.k_dyn
+        return sorted(dict.fromkeys(found), key=lambda row: (row.effort.order, -row.run.k_dyn))
 
     def summary(self) -> dict[str, Any]:
         """As plain data."""

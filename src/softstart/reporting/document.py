@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
@@ -54,6 +54,7 @@ if TYPE_CHECKING:
 
     from softstart.reporting.result import Report
     from softstart.start.duty_comparison import DutyRow
+    from softstart.start.recommendation import Row
 
 HERE = Path(__file__).parent
 HIDDEN = ("name", "source", "assumed", "units", "noise_seed", "encoder_phase")
@@ -66,7 +67,6 @@ LEFT_OUT = (
 )  # columns of the steps of a duty
 MOST_SHAFTS = 6  # with a column each in a table
 LONGEST = 70  # characters of a name in the head of a page
-SAME = 0.005  # a peak within this share of another is the same
 HARMED = 0.05  # rounded values that cost more than this share of K_dyn or start time are told at once
 FUNCTIONS = {
     "limit": "torque limit",
@@ -166,7 +166,11 @@ def templates() -> Environment:
     )  # fmt: skip
     found.filters |= FILTERS
     found.tests |= {"nan": math.isnan, "finite": math.isfinite}
-    found.globals |= {"SAME": SAME, "HARMED": HARMED}
+    found.globals |= {
+        "SAME": choice.SAME, "HARMED": HARMED, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
+        "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": RPM, "REACTS": REACTS,
+        "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
+    }  # fmt: skip
     return found
 
 
@@ -215,9 +219,6 @@ def document(report: Report) -> str:
         "validity": "Assumptions and validity",
         "provenance": "About this document",
     }
-    ordinary = [report.choice.ordinary] if report.choice.ordinary else []
-    choices = dict.fromkeys([report.choice.direct, *ordinary, *report.choice.recommendation.shown])
-    by_effort = sorted(choices, key=lambda row: (row.effort.order, -row.run.k_dyn))
     values = {
         "report": report, "drive": drive, "choice": report.choice, "limit": report.limit, "what": what,
         "no_lives": report.lives if asked and not lasts else "",
@@ -239,14 +240,27 @@ def document(report: Report) -> str:
         "chains": chains, "beside": beside, "lives": lives, "duties": duties, "duty_steps": duty_steps,
         "output": f"|#at the output, {units.label('N*m')}" if drive.gear and not units.gear else "",
         "strategies": strategies, "equal_time": equal_time,
-        "data_of": data_of, "functions": functions(report), "by_effort": by_effort,
+        "data_of": data_of, "functions": functions(report), "start_in_words": start_in_words,
         "drive_lines": drives.drive_lines, "curves": list(drives.curves(drive)),
-        "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
-        "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": RPM, "REACTS": REACTS,
-        "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
     }  # fmt: skip
     with drawing():  # a name may have characters that the font of the figures has not
         return page.get_template("report.html.j2").render(values)
+
+
+def start_in_words(drive: Any, rows: Sequence[Row] = ()) -> str:
+    """Where the starts of a figure begin, and at which shaft they are seen; each of `rows` from its worst.
+
+    >>> start_in_words(Drive.load("crane-4amtkf"))
+    'Start in the middle of the gap; torques and speeds at the motor shaft.'
+    """
+    units, (first, *others) = units_of(drive), drive.positions
+    where = f"Start {drives.POSITIONS[first]}" if first else ""
+    if others:
+        each = [f"{row.name} {drives.POSITIONS[row.run.position]}" for row in rows]
+        worst = listed(each) if rows else "the worst of both flanks and the middle counts"
+        where = f"Start position unknown: {worst}"
+    where = where or f"Start at a twist of {digits(units.shown(float(drive.theta0), 'rad'))} {units.angle}"
+    return f"{where}; torques and speeds at the {'output' if units.gear else 'motor'} shaft."
 
 
 def limit_figure(report: Report) -> Figure:

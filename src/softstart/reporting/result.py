@@ -402,19 +402,19 @@ def report(
             sheets.append(make_sheet(machine, controller, row.run, steps, row, drawn, soft))
 
     curve = limit(
-        machine,
-        [row.run.start_time for row in choice.foremost if not math.isnan(row.run.start_time)],
-        [row.run.start_time for row in comparison.rows if not math.isnan(row.run.start_time)],
-        choice.direct.run.start_time,
-        budget,
-        lambda share, text: show(0.5 + 0.5 * share, text),
-        meanwhile=round_off,
-    )
+        machine, _start_times(choice.foremost), _start_times(comparison.rows), choice.direct.run.start_time,
+        budget, lambda share, text: show(0.5 + 0.5 * share, text), meanwhile=round_off,
+    )  # fmt: skip
     show(1.0, "done")
     return Report(
         machine, tuple(failed), curve, choice, tuple(sheets), steps, provenance(machine, command), about,
         _at_equal_time(machine, as_they_are), both,
     )  # fmt: skip
+
+
+def _start_times(rows: Sequence[Row]) -> list[float]:
+    """Those of the rows that have one, s."""
+    return [row.run.start_time for row in rows if not math.isnan(row.run.start_time)]
 
 
 def _at_equal_time(machine: Machine, controllers: Sequence[Controller]) -> Comparison | None:

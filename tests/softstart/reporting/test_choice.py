@@ -1,5 +1,6 @@
 """The recommendation follows its rule, the map is that of simulate, what is said of the limit is proved."""
 
+import itertools
 import math
 import re
 from dataclasses import replace
@@ -7,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from softstart import Command, Drive, PlainController, simulate
+from softstart import Command, Drive, Effort, PlainController, simulate
 from softstart.controller import make_controller
 from softstart.optimal.bounds import momentum_bound
 from softstart.optimal.front import FrontPoint
@@ -16,6 +17,7 @@ from softstart.reporting import report
 from softstart.reporting.choice import robustness
 from softstart.reporting.document import text_answer
 from softstart.reporting.limit import OptimumCurve, bound_at, limit
+from softstart.start.recommendation import keeps
 from softstart.start.settings import Setting
 
 from .conftest import Page
@@ -121,7 +123,7 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
     def said(words, *, known=1.0, **changes):
         point = FrontPoint(best.run.start_time, "reached", "OPTIMAL", "", k_dyn=known * best.run.k_dyn)
         made = replace(hostile, limit=OptimumCurve(points=(point,)), sheets=(replace(sheet, **changes),))
-        return words in re.split(r" In the [\d.]+ s of ", text_answer(made))[0]  # what follows is of the ramp
+        return words in re.split(r" In that of ", text_answer(made))[0]  # what follows is of the ramp
 
     calm = {"rounded": SimpleNamespace(k_dyn=k, limited_time=time), "worst_k_dyn": k, "slowest": time}
     for share, told in ((1.049, False), (1.051, True)):
@@ -139,16 +141,16 @@ def test_what_an_answer_adds_is_worth_half_a_percent_and_rounding_5_percent(host
 def test_each_bound_is_that_of_the_start_beside_which_it_stands(hostile, read):
     """The answer has two starts of different times, each with the bound of its own; so has each row."""
     made = hostile
-    pattern = r"[Ii]n the ([\d.]+) s of (\S+) (?:with a K_dyn|none is) below (\d+\.\d+)"
+    pattern = r"(?:time|In that) of (\S+), ([\d.]+) s, (?:with a K_dyn|none is) below (\d+\.\d+)"
     said = re.findall(pattern, made.answer)
-    assert {name for _, name, _ in said} == {made.choice.chosen.name, made.choice.ordinary.name}
-    assert len({time for time, _, _ in said}) == 2
+    assert {name for name, *_ in said} == {made.choice.chosen.name, made.choice.ordinary.name}
+    assert len({time for _, time, _ in said}) == 2
     own = read.rows("lower bound at that time")
     for row in made.comparison.rows:
         time = row.run.start_time
         bound = momentum_bound(Problem(made.drive, time, "reached")).k_dyn
         assert float(own[row.name]["lower bound at that time"]) == pytest.approx(bound, abs=5e-4)
-        for told, _, below in (one for one in said if one[1] == row.name):
+        for _, told, below in (one for one in said if one[0] == row.name):
             assert float(told) == pytest.approx(time, rel=1e-3)
             assert 0.0 <= bound - float(below) <= 1e-3  # rounded to the safe side
 
@@ -199,3 +201,36 @@ def test_a_bound_for_one_contact_is_not_told_as_one_for_every_start(hostile):
     assert float(row["times the bound"]) == pytest.approx(
         direct.k_dyn / bound_at(hostile.drive, direct.start_time), abs=5e-3
     )
+
+
+def test_more_effort_is_listed_only_where_it_buys_a_lower_peak():
+    crane = Drive.load("crane-4amtkf")
+    for permitted in (None, 170.0):
+        made = report(crane.replace(permissible_torque=permitted), budget=0.0)
+        rows, limits = made.choice.more_effort, made.choice.recommendation.limits
+        assert rows[0].name == "direct"
+        assert rows[-1].effort is Effort.ENCODER
+        assert made.choice.chosen in rows
+        k_dyn = [row.run.k_dyn for row in rows]
+        assert all(after < 0.995 * before for before, after in itertools.pairwise(k_dyn))
+        assert all(keeps(row, limits) for row in rows[1:])
+        table = Page(made.to_html()).rows("less than direct")
+        assert list(table) == [row.name for row in rows]
+        assert ("limits" in table["direct"]) == (permitted is not None)
+
+
+def test_each_figure_of_a_start_says_where_it_begins_and_at_which_shaft():
+    crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0)
+    for changes, where, shaft in (
+        ({}, "Start in the middle of the gap", "motor"),
+        ({"units": "kN m, at output"}, "Start in the middle of the gap", "output"),
+        ({"start_position": "unknown"}, "Start position unknown: direct on the ", "motor"),
+    ):
+        page = report(crane.replace(**changes), controllers=["ramp"], budget=0.0).to_html()
+        captions = [
+            " ".join(one.split()) for one in re.findall(r"<figcaption>(.*?)</figcaption>", page, re.DOTALL)
+        ]
+        of_starts = [one for one in captions if "The drive, everything" not in one]
+        assert len(of_starts) == 4
+        assert where in of_starts[0]
+        assert all(one.endswith(f"; torques and speeds at the {shaft} shaft.") for one in of_starts)
