@@ -57,7 +57,7 @@ def violations(page: Any, axe: str) -> list[str]:
 def test_the_page_has_no_serious_violation(visit: Callable[..., Any], axe: str) -> None:
     page = visit(1280, 800)
     page.wait_for_function("document.querySelectorAll('tbody tr').length > 5")
-    for name in ("Optimum", "Limit", "Checks", "Tuning", "Sheet", "Log", "Files"):
+    for name in ("Optimum", "Pareto", "Checks", "Tuning", "Sheet", "Log", "Files"):
         page.get_by_role("tab", name=name, exact=True).click()
         if name == "Checks":
             page.get_by_test_id("checks-go").click()

@@ -51,7 +51,7 @@ def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_
 
 
 def test_the_limit_is_cancelled_in_mid_run_and_the_page_lives_on(page: Any, server: Any) -> None:
-    page.get_by_role("tab", name="Limit", exact=True).click()
+    page.get_by_role("tab", name="Pareto", exact=True).click()
     page.get_by_test_id("curve-go").click()
     comes_to(lambda: state(page, "curve").startswith("Computing: start "), True)
     before = set(server.jobs())
@@ -65,7 +65,7 @@ def test_the_limit_is_cancelled_in_mid_run_and_the_page_lives_on(page: Any, serv
 
 def test_tables_of_an_answer_stay_within_their_column(page: Any) -> None:
     """At 1280 pixels nothing is to be scrolled sideways; what has no room goes on below its first column."""
-    page.get_by_role("tab", name="Limit", exact=True).click()
+    page.get_by_role("tab", name="Pareto", exact=True).click()
     page.get_by_test_id("curve-go").click()
     answer = page.get_by_test_id("curve-answer")
     answer.locator("table").first.wait_for()
@@ -77,7 +77,7 @@ def test_tables_of_an_answer_stay_within_their_column(page: Any) -> None:
 def test_panels_stay_within_their_column(page: Any) -> None:
     """Nothing is cut off sideways."""
     panel = page.locator(".instrument .panel").first
-    for name in ("Optimum", "Limit", "Tuning", "Files", "Checks", "Sheet", "Log"):
+    for name in ("Optimum", "Pareto", "Tuning", "Files", "Checks", "Sheet", "Log"):
         page.get_by_role("tab", name=name, exact=True).click()
         panel.wait_for()
         comes_to(lambda: panel.evaluate("e => e.scrollWidth - e.clientWidth <= 1"), True)

@@ -127,7 +127,7 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     before = page.locator(".drive-name").inner_text()
     page.get_by_test_id("sheet-use").click()
     trouble = page.get_by_test_id("sheet-trouble")
-    trouble.get_by_text("[motor] rated_power is missing").wait_for()
+    trouble.get_by_text("Rated power is missing").wait_for()
     comes_to(page.locator(".drive-name").inner_text, before)
     assert page.get_by_test_id("sheet-load-reeving").is_hidden()
     for path, text in SHEET.items():

@@ -229,7 +229,7 @@ def test_a_start_with_too_fast_a_motion_is_given_up(monkeypatch: pytest.MonkeyPa
     assert batch.status.values.tolist() == ["TOO_STIFF", "REACHED"]
     assert np.isnan(batch.k_dyn.values[0])
     monkeypatch.setattr("softstart.start.trajectory.MOST_BYTES", 1_000_000)
-    with pytest.raises(SimulationError, match="or memory"):
+    with pytest.raises(SimulationError, match="or more memory"):
         simulate(stiff, "direct")
 
 

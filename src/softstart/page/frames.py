@@ -482,10 +482,11 @@ def row(session: Session, result: Strategy) -> Frame:
     line = outcomes(result, session.inputs.units) | {"duty": None if duty is None else json_number(duty)}
     line |= {"trouble": result.trouble or ("" if math.isfinite(time) else result.status)}
     if known is None:
-        empty = dict.fromkeys(("worn", "soft", "settled", "settled_lost", "overshoot"))
+        empty = dict.fromkeys(("worn", "light", "soft", "settled", "settled_lost", "overshoot"))
         return line | empty | {"limits": "", "flag": flag, "set_to": ""}
     return line | {
         "worn": json_number(known.k_dyn_worn_gap),
+        "light": json_number(known.cases["J2 x0.4"].k_dyn),
         "soft": json_number(known.cases[SOFT_END].k_dyn) if SOFT_END in known.cases else None,
         "settled": json_number(known.run.settled_time),
         "settled_lost": json_number(known.settled_lost),

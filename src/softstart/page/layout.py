@@ -30,7 +30,7 @@ LARGE = "Sheet"  # this tab is built when it is opened: others would feel it
 # further tabs: title, module and class
 PANELS = (
     ("Optimum", "panels", "OptimumPanel"),
-    ("Limit", "panels", "LimitPanel"),
+    ("Pareto", "panels", "ParetoPanel"),
     ("Checks", "panels", "ChecksPanel"),
     ("Tuning", "panels", "TuningPanel"),
     ("Sheet", "data_sheet_panel", "DataSheetPanel"),

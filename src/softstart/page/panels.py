@@ -1,4 +1,4 @@
-"""The tabs whose answer is computed in the background: Optimum, Limit, Checks, Tuning, Log."""
+"""The tabs whose answer is computed in the background: Optimum, Pareto, Checks, Tuning, Log."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class OptimumPanel(JobPanel):
         return optimum_seconds(self.session.inputs.machine)
 
 
-class LimitPanel(JobPanel):
+class ParetoPanel(JobPanel):
     """The least K_dyn over the start time, the strategies beside it."""
 
     name = "curve"

@@ -24,7 +24,7 @@ class Status(Enum):
     STOPPED_EARLY = "The run ended at the time asked for; the load does not have its target speed."
     NOT_REACHED = "The load did not reach its target speed within the time limit."
     FAULT = "The controller found a fault in what it measured, and demanded no torque from then on."
-    TOO_MANY_EVENTS = "The start was given up: it has more events or control instants than max_events allows."
+    TOO_MANY_EVENTS = "The start was given up: it has more events or control instants than are computed."
     NOT_LOCATED = "The start was given up: an event could not be located to machine precision."
     NOT_FINITE = "The start was given up: a state is no longer a finite number."
     BAD_COMMAND = (
@@ -44,8 +44,8 @@ class Status(Enum):
         "inertias, stiffness and target speed, or end the run earlier (until)."
     )
     TOO_STIFF = (
-        "The start was given up: it takes more steps of computation than max_events (two for each) or memory "
-        "(1 GB) permit, as its fastest motion is too fast for so long a start. Check the units of damping, "
+        "The start was given up: it takes more steps of computation, or more memory (1 GB), than a start "
+        "may have, as its fastest motion is too fast for so long a start. Check the units of damping, "
         "stiffness and inertias, or end the run earlier (until)."
     )
     NO_BETTER = "The start was given up: its peak or its time is already beyond that of a better one."

@@ -195,7 +195,7 @@ SHOWN = {
         "Damping is estimated (ratio 4 % from 3 gears and 2 couplings)",
         "Life over that under direct",
     ],
-    ANCHOR: ["method closed-form", "0.909247", "optimality gap"],
+    ANCHOR: ["method closed-form", "0.909247", "above the bound"],
     QUICK_TUNE + " --set gear.ratio=10": [
         "Gaps at the output: 0.05000 to 0.2000 rad, load inertias there: 7.000 to 17.50 kg m2",
     ],

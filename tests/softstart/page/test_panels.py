@@ -205,7 +205,7 @@ def test_each_panel_asks_for_a_task_with_its_fields(client: Any) -> None:
     from softstart.page import files_panel, panels
 
     session = Session("crane-4amtkf", controllers=["direct"])
-    classes = (panels.OptimumPanel, panels.LimitPanel, panels.ChecksPanel, panels.TuningPanel)
+    classes = (panels.OptimumPanel, panels.ParetoPanel, panels.ChecksPanel, panels.TuningPanel)
     for panel in (*classes, files_panel.ReportPanel):
         function, *arguments = panel(session, "A", Queue()).task()
         inspect.signature(function).bind(*arguments, progress=None)

@@ -3,7 +3,7 @@ import { button, element, fixed, put, significant } from "./numbers.js";
 
 const FACTS = [
   ["start time", "s", (f) => fixed(f.start_time, 4)],
-  ["settled later", "s", (f) => fixed(f.settled_lost, 4)],
+  ["later", "s", (f) => fixed(f.settled_lost, 4)],
   ["overshoot", "%", (f) => fixed(f.overshoot, 1)],
   ["peak torque", "N m", (f) => significant(f.peak_torque, 5)],
   ["at the output", "N m", (f) => significant(f.output_torque, 5)],
