@@ -14,6 +14,7 @@ from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, drawn
 
 from softstart import Chain, DataSheet, Drive, TorqueProfile, export_controller, parameter_sheet, simulate
 from softstart.controller import make_controller
+from softstart.project import Project
 
 CRANE = Drive.load("crane-4amtkf")
 SHEET = {
@@ -94,9 +95,7 @@ def test_what_the_page_saves_of_a_strategy_it_loads(files: Any, tmp_path: Path) 
     """A profile comes back as it was; a wrong file is refused in a sentence."""
     profile = TorqueProfile([0.0, 0.1, 0.1], [20.0, 62.0, 30.0])
     profile.to_toml(tmp_path / "own-profile.toml")
-    upload = files.locator('input[type="file"]').nth(1)
-    content = (tmp_path / "own-profile.toml").read_bytes()
-    upload.set_input_files({"name": "own-profile.toml", "mimeType": "text/plain", "buffer": content})
+    put(files, "own-profile.toml", (tmp_path / "own-profile.toml").read_bytes())
     caption = files.get_by_test_id("export-strategy")
     comes_to(caption.inner_text, "Selected: own-profile")
     name, saved_profile = saved(files, "export-profile-toml")
@@ -104,8 +103,8 @@ def test_what_the_page_saves_of_a_strategy_it_loads(files: Any, tmp_path: Path) 
     (tmp_path / name).write_bytes(saved_profile)
     again = TorqueProfile.load(tmp_path / name)
     assert (again.time.tolist(), again.torque.tolist()) == (profile.time.tolist(), profile.torque.tolist())
-    upload.set_input_files({"name": "wrong.csv", "mimeType": "text/plain", "buffer": b"nothing"})
-    files.get_by_test_id("strategy-trouble").get_by_text("wrong.csv").first.wait_for()
+    put(files, "wrong.csv", b"nothing")
+    files.get_by_test_id("drive-trouble").get_by_text("wrong.csv").first.wait_for()
     comes_to(caption.inner_text, "Selected: own-profile")
 
 
@@ -188,3 +187,23 @@ def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:
     ]
     pins = [one["share"] for one in files.evaluate(f"{INSTRUMENT}.scheme.states")]
     assert pins == pytest.approx(shares, abs=0.05)
+
+
+def test_a_profile_is_pasted_and_the_project_saved_and_loaded_again(files: Any, tmp_path: Path) -> None:
+    own = simulate(CRANE, TorqueProfile([0.0, 0.1], [20.0, 62.0]))
+    files.get_by_test_id("paste-text").fill("0\t20\n0.1\t62")
+    files.get_by_test_id("paste-add").click()
+    k_dyn(files, f"{own.k_dyn:.3f}")
+    name, content = saved(files, "project-save")
+    (tmp_path / name).write_bytes(content)
+    project = Project.open(tmp_path / name)
+    assert (project.strategy, project.single()) == ("mine", CRANE)
+    gap = files.locator('[data-path="shaft.gap"] input[type=text]')
+    gap.fill("0.75")
+    gap.press("Enter")
+    put(files, name, content)
+    k_dyn(files, f"{own.k_dyn:.3f}")
+    comes_to(gap.input_value, "0.5")
+    files.locator(".drive-name").click()
+    files.keyboard.press("Control+z")
+    comes_to(gap.input_value, "0.75")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -62,7 +63,7 @@ def project_command(
     project = Project.open(file)
     if action == "report":
         return written_report(lambda *shown: _report(project, *shown, **steps), to, pdf)
-    return _shown(project, check)
+    return _shown(project, file, check)
 
 
 def _new(kind: type[Project], path: Path, parts: tuple[str, ...]) -> Output:
@@ -73,18 +74,24 @@ def _new(kind: type[Project], path: Path, parts: tuple[str, ...]) -> Output:
     project = kind.new(*parts)
     with options.named_as_options(output="FILE"):
         project.save(path)
-    data, sheet = _shown(project)
+    data, sheet = _shown(project, str(path))
     return data, replace(sheet, notes=[*sheet.notes, f"Written to {path}."])
 
 
-def _shown(project: Project, check: bool = False) -> tuple[Any, Any]:
+def _shown(project: Project, path: str, check: bool = False) -> tuple[Any, Any]:
     from softstart.views.projects import project_sheet
 
     checks = {}
     with working("starting the optima ..."), attributed():
         for one in project.optima if check else ():
             checks[one.name] = max(run.k_dyn for run in one.checked(project.single(one.machine)))
-    return project.summary, project_sheet(project, checks)
+    sheet = project_sheet(project, checks)
+    steps = [
+        ("serve", [], "the interactive page"),
+        ("project report", ["--out", "report.html"], "its report"),
+    ]
+    commands = [(shlex.join(["softstart", *name.split(), path, *more]), gives) for name, more, gives in steps]
+    return project.summary, replace(sheet, commands=commands)
 
 
 def _report(project: Project, progress: Any, typed: str, **steps: Any) -> Report:

@@ -4,32 +4,51 @@ from __future__ import annotations
 
 import threading
 import webbrowser
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from softstart.cli import options
-from softstart.cli.options import command, option
+from softstart.cli.options import command, drive_names, option
 from softstart.cli.running import working
 from softstart.errors import InputError
+from softstart.input.files import read_text, refusal_of
 from softstart.page.address import Address
 from softstart.page.serve import check_installed, listening, run_server
+from softstart.quantities import RefusedError
 
 if TYPE_CHECKING:
     from softstart.page.machines import Loaded
+    from softstart.project import Project
+
+
+def _read(name: str, settings: Sequence[str]) -> Loaded | Project:
+    """A machine as other commands read it, or a project."""
+    if name not in drive_names() and refusal_of(name) is None:
+        from softstart.project import Project
+        from softstart.project.parts import kind_of
+
+        kind = ""
+        with suppress(InputError, RefusedError):  # told by the reader of machines
+            kind = kind_of(read_text(name), name)
+        if kind == "project":
+            return Project.open(name)
+    return options.read_as_known(name, settings)
 
 
 @command("serve")
-@options.of_drive(options.read_as_known)
+@options.of_drive(_read)
 @option("--port", type=int, default=8765, show_default=True)
 @option("--host", default="127.0.0.1", show_default=True)
 @option("--token")
 @option("--expose", is_flag=True)
 @option("--no-browser", is_flag=True)
-def serve_command(*, drive: Loaded, no_browser: bool, **arguments: Any) -> None:
+def serve_command(*, drive: Loaded | Project, no_browser: bool, **arguments: Any) -> None:
     """Open the interactive page in the browser.
 
-    DRIVE is a TOML file or the name of a shipped drive or chain; by default the crane drive of the
-    literature. The server accepts connections from this machine only, unless --expose is given; Ctrl-C stops
-    it. Needs NiceGUI: pip install 'softstart[ui]'.
+    DRIVE is a TOML file, of a machine or a project, or the name of a shipped drive or chain; by default the
+    crane drive of the literature. The server accepts connections from this machine only, unless --expose is
+    given; Ctrl-C stops it. Needs NiceGUI: pip install 'softstart[ui]'.
 
     Options
     -------
@@ -68,7 +87,7 @@ def serve_command(*, drive: Loaded, no_browser: bool, **arguments: Any) -> None:
         run_server(drive, address, listener, ready)
 
 
-def _warm_up(machine: Loaded) -> None:
+def _warm_up(machine: Loaded | Project) -> None:
     """Start all strategies once: whatever must be compiled is compiled before the page opens."""
     from softstart.page import machines
     from softstart.page.session import Session

@@ -21,6 +21,7 @@ from softstart.drive import Drive, library
 from softstart.drive.machine import Machine
 from softstart.page.sentences import changes
 from softstart.plugins import controller_names
+from softstart.project.parts import profile_of
 from softstart.quantities import shortest
 
 if TYPE_CHECKING:
@@ -119,17 +120,6 @@ def duty_text(machine: Machine, label: str, controller: Controller, stop: str) -
     """
     text = command_text(machine, {label: controller}, "duty", *(["--stop", stop] if stop else []))
     return re.sub(r"--param [\w-]+\.", "--param ", text.replace("--controllers", "--controller"))
-
-
-def profile_of(controller: Controller) -> TorqueProfile | None:
-    """The torque profile that a controller plays; None for one that plays none.
-
-    >>> from softstart.controller import make_controller
-    >>> profile_of(make_controller("direct")) is None
-    True
-    """
-    profile = getattr(controller, "profile", None)
-    return profile if hasattr(profile, "to_c") else None
 
 
 def drive_words(drive: Machine) -> list[str]:

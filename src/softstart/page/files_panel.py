@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Hashable
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from typing import ClassVar
 
 from nicegui import ui
 
-from softstart.chain.machines import is_chain_text
-from softstart.controller.base import Controller
-from softstart.controller.finding import make_controller
-from softstart.drive.data_sheet import DataSheet
-from softstart.errors import InputError
-from softstart.input.documents import parsed
-from softstart.input.parameters import Wording
+from softstart.errors import InputError, SimulationError
 from softstart.page import tasks
 from softstart.page.downloads import (
     command_text,
@@ -25,19 +17,31 @@ from softstart.page.downloads import (
     duty_text,
     file_name,
     profile_file,
-    profile_of,
     shipped_drives,
     written_text,
 )
 from softstart.page.job_panel import JobPanel, Task
-from softstart.page.machines import Loaded, machine_from
-from softstart.page.panel_parts import POLL, Troubles, action, box, choice, follow, hint, notify, save, upload
+from softstart.page.machines import Loaded
+from softstart.page.panel_parts import (
+    POLL,
+    Troubles,
+    action,
+    box,
+    choice,
+    follow,
+    hint,
+    notify,
+    save,
+    text_field,
+    upload,
+)
+from softstart.page.project import project_of, take_file, take_text
 from softstart.page.session import Session
-from softstart.profile import TorqueProfile
+from softstart.project.parts import kind_of, profile_of
 from softstart.views.numbers import cut
 
-LARGEST = 64 * 1024  # bytes of a drive file
-LONGEST_LINE = 2000  # characters; a key of thousands of parts is read for many seconds
+LARGEST = 512 * 1024  # bytes of a file
+AS_LOADED = "this machine as loaded"
 
 
 class FilesPanel:
@@ -45,8 +49,8 @@ class FilesPanel:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         parts = {
-            "Drive": (DriveFiles,),
-            "Strategies": (StrategyFiles,),
+            "Project and drive": (DriveFiles, BesidePanel),
+            "Strategies": (StrategyText,),
             "Export": (Exports, ParameterSheetPanel, ProgramPanel, ReportPanel),
             "Command line": (command_line,),
         }
@@ -63,16 +67,21 @@ class DriveFiles:
         self._session = session
         shipped = {"": "choose one", **{name: drive.name for name, drive in shipped_drives().items()}}
         with box("panel-form"):
-            remedy = "a drive file has one or two"
-            upload("Load a file ...", "drive", ".toml", LARGEST, remedy, self._uploaded, self._refuse)
+            remedy = "a drive file has one or two, a project some more"
+            upload("Load a file ...", "drive", ".toml,.csv", LARGEST, remedy, self._uploaded, self._refuse)
+            action("Save project", self._save_project, "project-save")
             action("Save as TOML", self._save, "drive-save")
             self._shipped = choice("Shipped drives", shipped, "", "drive-shipped")
             self._shipped.on_value_change(lambda event: self._take(str(event.value or "")))
-        hint("A drive file holds texts with units or bare SI numbers; a mistake in it changes nothing here.")
+        hint(
+            "Whatever is saved here: projects, drives, tuned gains, torque profiles (CSV, TOML), duties. A "
+            "mistake in a file changes nothing here."
+        )
         self._troubles = Troubles("drive")
 
     def _uploaded(self, content: bytes, name: str) -> None:
-        self._take_over(machine_of(content, name))
+        self._troubles.say(())
+        notify(take_file(self._session, content, name))
 
     def _take(self, name: str) -> None:
         if name:
@@ -85,7 +94,12 @@ class DriveFiles:
         notify(f"{cut(self._session.inputs.machine.name)} is loaded.")
 
     def _refuse(self, name: str, error: InputError) -> None:
-        self._troubles.say(error.sentences, f"{cut(name)} was not loaded; the drive is unchanged.")
+        self._troubles.say(error.sentences, f"{cut(name)} was not loaded; nothing is changed.")
+
+    def _save_project(self) -> None:
+        project = project_of(self._session)
+        name = file_name(project.project or project.machine, "project", suffix=".toml")
+        save(project.to_toml(), name)
 
     def _save(self) -> None:
         inputs = self._session.inputs
@@ -93,66 +107,71 @@ class DriveFiles:
         save(machine.to_toml(), drive_file(machine))
 
 
-def machine_of(content: bytes, name: str) -> Loaded:
-    """The drive, chain or data sheet in the bytes of a file; InputError with a sentence for each mistake.
-
-    >>> machine_of(b"\\xff\\xfe", "mine.toml")
-    Traceback (most recent call last):
-    softstart.errors.InputError: mine.toml: the file is not UTF-8 text (line 1); save it as UTF-8.
-    """
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        place = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{name}: the file is not UTF-8 text (line {place}); save it as UTF-8.") from None
-    for number, line in enumerate(text.splitlines(), 1):
-        if len(line) > LONGEST_LINE:
-            raise InputError(
-                f"{name}: line {number} has more than {LONGEST_LINE} characters, as no drive file has."
-            )
-    if not is_chain_text(text) and DataSheet.describes(parsed(text, Wording(style="toml"), "a drive")):
-        return DataSheet.from_toml(text).possible
-    return machine_from(text)
-
-
-class StrategyFiles:
-    """Tuned gains and torque profiles, as the page and the commands save them, join the strategies."""
+class StrategyText:
+    """A torque profile or the file of a strategy as text, pasted: it joins the strategies at once."""
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        with box("panel-form") as form:
-            vars(form)["panel"] = self  # an upload does not keep what it calls
-            remedy = "gains and profiles have fewer"
-            upload(
-                "Load a strategy ...", "strategy", ".toml,.csv", LARGEST, remedy, self._uploaded, self._refuse
-            )
-        hint("Tuned gains (TOML) or a torque profile (TOML, CSV), as they are saved here.")
-        self._troubles = Troubles("strategy")
+        self._name = text_field("Name", "mine", "paste-name")
+        example = "time [s] and torque [N m], as copied from a spreadsheet, or the text of a strategy file"
+        self._text = ui.textarea(placeholder=example).props(
+            'dense outlined aria-label="Torque profile" data-testid="paste-text"'
+        )
+        self._text.classes("panel-wide")
+        action("Add to the strategies", self._add, "paste-add")
+        hint("A line for each instant, straight in between; the start under it is in the table at once.")
+        self._troubles = Troubles("paste")
 
-    def _uploaded(self, content: bytes, name: str) -> None:
+    def _add(self) -> None:
         self._troubles.say(())
-        label = self._session.add(Path(name).stem, strategy_of(content, name))
-        notify(f"{cut(label)} joins the strategies.")
-
-    def _refuse(self, name: str, error: InputError) -> None:
-        self._troubles.say(error.sentences, f"{cut(name)} was not loaded; the strategies are unchanged.")
-
-
-def strategy_of(content: bytes, name: str) -> Controller:
-    """The tuned gains or the player of the torque profile in the bytes of a file.
-
-    >>> strategy_of(b"time,torque\\n0,20\\n0.1,62\\n", "mine.csv").profile.torque.tolist()
-    [20.0, 62.0]
-    """
-    with tempfile.TemporaryDirectory(prefix="softstart-") as folder:
-        path = Path(folder) / Path(name).name
-        path.write_bytes(content)
+        label, text = str(self._name.value or "mine"), str(self._text.value or "")
         try:
-            if path.suffix.lower() == ".toml" and b"kind" in content:
-                return make_controller(str(path))
-            return make_controller("profile", {"profile": TorqueProfile.load(path)})
-        except InputError as error:  # the user knows the file by its name
-            raise InputError([text.replace(str(path), name) for text in error.sentences]) from None
+            if (kind := kind_of(text, label)) != "strategy":
+                raise InputError(f"{label}: this is a {kind}; load its file instead.")
+            notify(take_text(self._session, text, label))
+        except (InputError, SimulationError) as error:
+            sentences = getattr(error, "sentences", (str(error),))
+            self._troubles.say(sentences, f"{cut(label)} was not added; the strategies are unchanged.")
+
+
+class BesidePanel(JobPanel):
+    """The present machine and another one under the strategies of the table, in one table and figure."""
+
+    name = "beside"
+    about = (
+        "The strategies of the table on this machine and on another one of the same kind, as loaded before "
+        "your changes, of the project or shipped; in one table and figure."
+    )
+    verb = "Compare"
+
+    def form(self) -> None:
+        """The other machine."""
+        ui.label("Two machines side by side").classes("panel-caption")
+        self._other = choice("Beside it", [AS_LOADED], AS_LOADED, "beside-machine")
+        follow(self.session, self._offer)
+
+    def _offer(self) -> None:
+        """The machines of the present project, and the shipped ones of this kind."""
+        inputs = self.session.inputs
+        own = [one.name for one in inputs.project.machines if one.name != inputs.project.machine]
+        names = [name for name, one in shipped_drives().items() if type(one) is type(inputs.machine)]
+        if (options := [AS_LOADED, *own, *names]) != self._other.options:
+            self._other.set_options(options, value=inputs.project.beside or AS_LOADED)
+
+    def task(self) -> Task:
+        """Both comparisons."""
+        inputs, name = self.session.inputs, str(self._other.value)
+        if name == AS_LOADED:
+            other: Loaded = inputs.origin
+        elif name in [one.name for one in inputs.project.machines]:
+            other = inputs.project.loaded(name)
+        else:
+            other = shipped_drives()[name]
+        return tasks.beside_task, inputs.both_ends, other, list(inputs.controllers.values())
+
+    def estimate(self) -> float:
+        """Two comparisons."""
+        return 4.0
 
 
 class Exports:

@@ -22,6 +22,7 @@ from softstart.page.live import Frame, Live
 from softstart.page.machines import Loaded
 from softstart.page.sentences import log, sentence_of
 from softstart.page.session import Session
+from softstart.project import Project
 
 WEB = Path(__file__).with_name("web")
 EXPLORE = "Explore"  # the tab of the live part: parameters of the strategy, and the map
@@ -51,7 +52,7 @@ def style() -> str:
     return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def warm(drive: Loaded) -> None:
+def warm(drive: Loaded | Project) -> None:
     """Do what the first tab would wait for, and others behind it."""
     first_strategy(drive)
     for _, module, _ in PANELS:
@@ -60,19 +61,20 @@ def warm(drive: Loaded) -> None:
 
 
 @cache
-def first_strategy(drive: Loaded) -> str:
+def first_strategy(drive: Loaded | Project) -> str:
     """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
     session.offer()
     return session.inputs.selected
 
 
-def build(drive: Loaded) -> Session:
+def build(drive: Loaded | Project) -> Session:
     """Build the page for the client of the moment, in a session of its own; returns that session."""
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
     session = Session(drive)
-    session.offer(first_strategy(drive))
+    if not (isinstance(drive, Project) and drive.strategy):  # else one is chosen
+        session.offer(first_strategy(drive))
     session.restore(session.inputs)  # the page begins here: that is no step to undo
     frames = FrameBuilder(session)
 
@@ -109,7 +111,7 @@ def build(drive: Loaded) -> Session:
     return session
 
 
-def page(drive: Loaded) -> None:
+def page(drive: Loaded | Project) -> None:
     """The page of one client; what stands in its way is said instead."""
     try:
         build(drive)

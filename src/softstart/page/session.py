@@ -24,6 +24,7 @@ from softstart.hints import nearest
 from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, sentence_of
+from softstart.project import Project
 from softstart.quantities import Units
 from softstart.start.comparison import (
     REFERENCE,
@@ -58,6 +59,9 @@ TOO_LONG_DUTY = (
     "The duty takes too long to be carried out while you wait; use softstart duty, or less repetitions."
 )
 MAX_EVENTS = 200_000  # of one start on the page, some tenths of a second; the command line allows a million
+
+
+NO_PROJECT = Project()
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,6 +139,7 @@ class Inputs:
     soft_end: Mapping[str, float] = field(default_factory=dict)  # of a drive loaded without stiffness: SOFT
     at_time: str = ""  # within which the strategies of the table are set to settle, "1.3x"; "" as they are
     duty: DutyPlan | None = None  # of the machine, without its own: start, hold, stop
+    project: Project = NO_PROJECT  # what it has beside that: names, notes, other machines, claims of optima
 
     @cached_property
     def units(self) -> Units:
@@ -235,8 +240,11 @@ class Session:
     """
 
     def __init__(
-        self, machine: Loaded | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
+        self, machine: Loaded | Project | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
     ) -> None:
+        project = machine if isinstance(machine, Project) else Project()
+        if isinstance(machine, Project):
+            machine = machine.loaded()
         stiff, soft_end = _both_ends(load_machine(machine) if isinstance(machine, str) else machine)
         stiff, duty = plan_of(stiff)
         names = list(ready_controller_names() if controllers is None else controllers)
@@ -262,6 +270,9 @@ class Session:
         self._reference: tuple[Reference, Strategy] | None = None
         self._duty_k_dyn: dict[str, tuple[tuple[Machine, Controller, DutyPlan], float]] = {}
         self._duty: tuple[tuple[Machine, Controller, DutyPlan], DutyResult] | None = None
+        if project.machines:
+            self.open(project)
+            self._past = []
 
     # the state -----------------------------------------------------------------------------------------
 
@@ -362,7 +373,18 @@ class Session:
             self._change(gesture, duty=plan)
 
     def load(self, machine: Loaded) -> None:
-        """Another drive or chain, without the optima and gains that were computed for this one."""
+        """Another drive or chain, without the optima and gains that were computed for this one.
+
+        A project keeps its machines and strategies as they are now, and the other machine is the one chosen.
+        """
+        from softstart.page.project import project_of  # which reads sessions
+
+        project = self.inputs.project
+        if project.machines:
+            kept = project_of(self).given()
+            project = Project(
+                **{key: kept[key] for key in kept if key not in ("machine", "beside", "strategy")}
+            )
         stiff, soft_end = _both_ends(machine)
         stiff, duty = plan_of(stiff)
         inputs = self.inputs
@@ -377,8 +399,27 @@ class Session:
             visible=inputs.visible.intersection(controllers),
             soft_end=soft_end,
             duty=duty,
+            project=project,
         )
         self._offered = self.inputs.selected
+
+    def open(self, project: Project) -> None:
+        """Another project: its machine, strategies and choice; one step that can be undone."""
+        present = self.inputs.both_ends_with_duty
+        stiff, soft_end = _both_ends(project.loaded() if project.machines else present)
+        stiff, duty = plan_of(stiff)
+        own = {one.name: one.controller for one in project.players}
+        if len(self._initial | own) > MAX_STRATEGIES:
+            raise InputError(
+                f"project: it has {len(own)} strategies; the page shows {MAX_STRATEGIES} in all."
+            )
+        controllers = self._initial | own
+        chosen = project.strategy
+        selected = chosen if chosen in controllers else _first_selected(controllers)
+        self._change(
+            machine=stiff, origin=stiff, controllers=controllers, selected=selected,
+            visible=frozenset((selected, *own)), soft_end=soft_end, duty=duty, project=project,
+        )  # fmt: skip
 
     def restore(self, inputs: Inputs) -> None:
         """Begin with earlier inputs, or with those of somebody else; nothing can be undone then."""
@@ -423,7 +464,8 @@ class Session:
         if not others:
             raise InputError(f'strategy "{label}": this is the last strategy; add another one first.')
         selected = next(iter(others)) if inputs.selected == label else inputs.selected
-        self._change(controllers=others, visible=inputs.visible - {label}, selected=selected)
+        project = inputs.project.without(label)
+        self._change(controllers=others, visible=inputs.visible - {label}, selected=selected, project=project)
 
     def select(self, label: str) -> None:
         """Make a strategy the one with the large figure; it is drawn from then on."""

@@ -19,13 +19,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.controller.base import Controller
-from softstart.controller.finding import make_controller, ready_controller_names
+from softstart.controller.finding import ready_controller_names
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.page.downloads import file_name, profile_file, written_text
 from softstart.page.machines import Loaded, with_typed_changes
 from softstart.page.sentences import page_sentence
 from softstart.parallel import Progress
+from softstart.project.parts import player_of
 from softstart.quantities import show
 from softstart.start.comparison import compare
 from softstart.start.fatigue import fatigue
@@ -84,8 +85,11 @@ def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progres
         with suppress(InputError, SimulationError):
             others.append(simulate(drive, name))
     label = optimum_label(best)
+    player = player_of(best.profile, label)
     return TaskResult(
-        shown(optimum_sheet(best, others)), profile_files(best, label), {label: player_of(best, label)}
+        shown(optimum_sheet(best, others)),
+        profile_files(best, label),
+        {label: player},
     )
 
 
@@ -95,13 +99,6 @@ def optimum_label(best: Optimum) -> str:
 
     ending = "" if best.problem.terminal == "reached" else f", {best.problem.terminal}"
     return f"{best_start(best.problem.drive)} {best.end_time:.4g} s{ending}"
-
-
-def player_of(best: Optimum, label: str) -> Controller:
-    """The controller that plays the optimum, under the name that it has among the strategies."""
-    player = make_controller("profile", {"profile": best.profile})
-    object.__setattr__(player, "name", label)  # as `softstart.controller.tuned` names tuned gains
-    return player
 
 
 def profile_files(best: Optimum, label: str) -> dict[str, str]:
@@ -135,6 +132,16 @@ def curve(
     limit = front.pareto(drive, terminal=terminal, controllers=controllers, progress=doing)
     name = file_name(drive.name, "limit", suffix=".csv")
     return TaskResult(shown(limit.sheet, first=True), {name: written_text(limit.to_csv, ".csv")})
+
+
+def beside_task(
+    first: Loaded, second: Loaded, controllers: Sequence[Controller], *, progress: Progress
+) -> TaskResult:
+    """Two machines side by side, or one before and after changes."""
+    from softstart.start.beside import side_by_side
+
+    progress(None, "starting both machines")
+    return TaskResult(shown(side_by_side(first, second, controllers).sheet, first=True))
 
 
 def tuning(
@@ -281,8 +288,9 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
         notes = error.sentences if isinstance(error, InputError) else [str(error)]
         return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=notes)))
     label = f"quickest {best.end_time:.4g} s"
+    player = player_of(best.profile, label)
     quickest = optimum_sheet(best, [row.run for row in compared.rows])
-    return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player_of(best, label)})
+    return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player})
 
 
 def sheet_task(drive: Loaded, controller: Controller, file: str, *, progress: Progress) -> TaskResult:

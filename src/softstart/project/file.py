@@ -210,6 +210,10 @@ class Project(ParameterFile):
         text = thing if isinstance(thing, str) else parts.file_of(thing)
         text = text.replace("\r\n", "\n")
         kind = parts.kind_of(text, name)
+        if kind == "project":
+            raise InputError(
+                f"{name}: this is a project itself; add the files of its machines and strategies."
+            )
         made = {"machine": StoredMachine, "strategy": StoredStrategy, "duty": StoredDuty}[kind]
         return self.with_part(made(name=name, file=text), KINDS[kind])
 
@@ -217,6 +221,15 @@ class Project(ParameterFile):
         """With a stored part, by default an optimum; it replaces one of its name."""
         others = [one for one in getattr(self, rows) if one.name != part.name]
         return self.replace(**{rows: (*others, part)})
+
+    def without(self, name: str) -> Self:
+        """Without the strategy or the optimum of this name, and the choice of it."""
+        given = self.given()
+        for rows in ("strategies", "optima"):
+            given[rows] = [one for one in getattr(self, rows) if one.name != name]
+        if self.strategy == name:
+            given.pop("strategy", None)
+        return type(self)(**given)
 
     def contradictions(self) -> Iterator[str]:
         """What is wrong in the files that the project holds, and names that are given twice or to nothing."""
@@ -228,7 +241,7 @@ class Project(ParameterFile):
         for one in self.machines:
             with wrong.collect():
                 known_from(one.file, f'machine "{one.name}"')
-        for player in self._players:
+        for player in self.players:
             with wrong.collect():
                 _ = player.controller
         for duty in self.duties:
@@ -261,11 +274,12 @@ class Project(ParameterFile):
     @property
     def strategy_names(self) -> list[str]:
         """The names of all strategies that can be chosen: of the project, then of softstart."""
-        own = [one.name for one in self._players]
+        own = [one.name for one in self.players]
         return list(dict.fromkeys([*own, *controller_names()]))
 
     @property
-    def _players(self) -> tuple[StoredStrategy | StoredOptimum, ...]:
+    def players(self) -> tuple[StoredStrategy | StoredOptimum, ...]:
+        """What has a controller: own strategies, then optima."""
         return (*self.strategies, *self.optima)
 
     def loaded(self, name: str = "") -> Machine | UnknownStiffness:
@@ -292,6 +306,11 @@ class Project(ParameterFile):
         machine = self.loaded(name)
         return machine.drive if isinstance(machine, UnknownStiffness) else machine
 
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        return self.project or self.machine or "a project"
+
     def summary(self) -> dict[str, Any]:
         """What is in it, as plain data."""
         choice = {key: getattr(self, key) for key in ("machine", "beside", "strategy", "duty")}
@@ -300,7 +319,7 @@ class Project(ParameterFile):
 
     def controller(self, name: str = "") -> Controller:
         """A strategy by its name, by default the chosen one: of the project, or one of softstart."""
-        own = {one.name: one for one in self._players}
+        own = {one.name: one for one in self.players}
         name = name or self.strategy
         return own[name].controller if name in own else make_controller(name)
 

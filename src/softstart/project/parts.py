@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from softstart.chain.machines import is_chain_text
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_of, make_controller, named
-from softstart.controller.tuned import read_gains, strategy_text
+from softstart.controller.tuned import ScheduleFile, read_gains, strategy_text
 from softstart.drive import Duty, Machine
-from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError
 from softstart.input.documents import parsed
 from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
@@ -181,6 +178,10 @@ def strategy_of(text: str, name: str) -> Controller:
     if toml and "kind" in parsed(text, Wording(where, style="toml"), "a strategy"):
         path = Path(name)
         saved = read_gains(text, path)
+        if not isinstance(saved, ScheduleFile) and "file" in saved.parameters:
+            raise InputError(
+                f"{where}: [parameters] file names another file; give the torque profile itself."
+            )
         inner = re.fullmatch(rf"{re.escape(saved.controller)} \((.+)\)", name)
         try:
             return controller_of(saved, path, inner[1] if inner else name)
@@ -225,26 +226,16 @@ def is_toml(text: str) -> bool:
 
 
 def kind_of(text: str, where: str) -> str:
-    """What the text of a file is: "machine", "strategy" or "duty"; InputError for anything else.
+    """What the text of a file is: "project", "strategy", "duty", or else "machine".
 
-    >>> kind_of("[[duty]]", ""), kind_of("time,torque", ""), kind_of("[motor]", "")
-    ('duty', 'strategy', 'machine')
+    >>> [kind_of(text, "") for text in ("[[duty]]", "time,torque", "[motor]", "version = 1")]
+    ['duty', 'strategy', 'machine', 'project']
     """
     if not is_toml(text):
         return "strategy"
-    if is_chain_text(text):
-        return "machine"
-    document = parsed(text, Wording(where, style="toml"), "a project's part")
-    for kind in _kinds(document):
-        return kind
-    reason = "this is no machine, strategy or duty; give a file that softstart reads as one of them"
-    raise InputError(f"{where}: {reason}.")
-
-
-def _kinds(document: dict[str, Any]) -> Iterator[str]:
+    document = parsed(text, Wording(where, style="toml"), "a machine")
+    if {"version", "project", "machine", "choice"} & document.keys():
+        return "project"
     if {"kind", "profile"} & document.keys():
-        yield "strategy"
-    if {"motor", "shaft"} & document.keys() or DataSheet.describes(document):
-        yield "machine"
-    if "duty" in document:
-        yield "duty"
+        return "strategy"
+    return "duty" if "duty" in document and not {"motor", "shaft", "mass"} & document.keys() else "machine"

@@ -38,7 +38,7 @@ def project_sheet(project: Project, checks: Mapping[str, float] = {}) -> Sheet:
         "Duties": (("duty", "what it is"), duties),
     }
     chosen = f"Chosen: {project.strategy} on {project.machine}." if project.strategy else ""
-    title = project.project or "A project"
+    title = project.name
     return Sheet(
         title,
         [title, *(f"  {what}  {value}" for what, value in project.lines if what != "Project")],

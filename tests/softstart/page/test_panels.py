@@ -15,6 +15,7 @@ import pytest
 from softstart import DataSheet, Drive, InputError
 from softstart.controller import make_controller
 from softstart.page.jobs import Jobs, JobState
+from softstart.page.project import machine_of
 from softstart.page.session import Session
 from softstart.page.tasks import TaskResult
 
@@ -150,31 +151,30 @@ def test_a_closed_tab_keeps_no_session(client: Any) -> None:
 
 
 def test_a_file_of_mistakes_is_told_in_some_sentences_and_read_at_once() -> None:
-    from softstart.page.files_panel import LARGEST, machine_of
+    from softstart.page.files_panel import LARGEST
     from softstart.page.panel_parts import MOST_SENTENCES, few
 
     with pytest.raises(InputError) as told:
-        machine_of(b"\n".join(b"k%d = 1" % k for k in range(5000)), "mine.toml")
+        machine_of("\n".join(f"k{k} = 1" for k in range(5000)), "mine.toml")
     missing = 7  # keys that a drive needs
     said = few(told.value.sentences)
     assert len(said) == MOST_SENTENCES + 1
     assert said[-1].startswith(f"There are {5000 + missing - MOST_SENTENCES:,} more")
     with pytest.raises(InputError, match="line 1 has more than 2000 characters"):  # it would be read for 14 s
-        machine_of(b"a." * (LARGEST // 2 - 2) + b"b=1", "mine.toml")
+        machine_of("a." * (LARGEST // 2 - 2) + "b=1", "mine.toml")
     named = Drive.load("crane-4amtkf").replace(name="Crane" * 24)
-    assert machine_of(named.to_toml().encode(), "mine.toml") == named
+    assert machine_of(named.to_toml(), "mine.toml") == named
 
 
 def test_a_data_sheet_without_stiffness_is_loaded_with_both_its_ends(client, monkeypatch) -> None:
     """From a file and from the form: what tuning, checks and report are asked for is both."""
     from softstart.page import panels
     from softstart.page.data_sheet_panel import DataSheetPanel
-    from softstart.page.files_panel import machine_of
 
     text = """load = { machine = "rotor", inertia = "160 kg*m^2", friction = "80 N*m" }
     motor = { rated_power = "3 kW", rated_speed = "1410 rpm", inertia = "0.0062 kg*m^2" }
     gear = { ratio = 38.1, backlash = "9 arcmin" }"""
-    ends = machine_of(text.encode(), "sheet.toml")
+    ends = machine_of(text, "sheet.toml")
     assert [one.Omega / math.tau for one in ends] == pytest.approx([30.0, 3.0], rel=1e-12)
     session = Session(controllers=["direct"])
     with client:
@@ -232,3 +232,38 @@ def test_an_optimum_of_another_machine_is_not_added(client: Any) -> None:
     session.undo()
     panel.add("optimum")
     assert list(session.inputs.controllers) == ["direct", "optimum"]
+
+
+def test_a_pasted_profile_joins_the_strategies_and_a_wrong_one_is_said(client: Any) -> None:
+    from softstart.page.files_panel import StrategyText
+
+    session = Session(controllers=["direct"])
+    with client:
+        panel = StrategyText(session, "A")
+        for text, version in (("0 20\n0.1 62", 1), ("0 20\n9 62", 1), ("[motor]", 1), ("", 1)):
+            panel._text.set_value(text)
+            panel._add()
+            assert session.version == version
+    assert session.added == ("mine",)
+
+
+def test_a_machine_beside_this_one_is_that_as_loaded_of_the_project_or_shipped(client: Any) -> None:
+    from softstart.page.files_panel import AS_LOADED, BesidePanel
+    from softstart.project import Project
+
+    worn = Drive.load("crane-4amtkf").replace(gap=2.0)
+    session = Session(Project.new("crane-4amtkf").added("worn", worn).replace(beside="worn"), ["direct"])
+    session.set("gap", 1.0)
+    with client:
+        panel = BesidePanel(session, "A", Queue())
+        assert panel._other.options[:2] == [AS_LOADED, "worn"]
+        for name, other in (
+            ("worn", worn),
+            (AS_LOADED, session.inputs.origin),
+            ("hoist-15kw", Drive.load("hoist-15kw")),
+        ):
+            panel._other.set_value(name)
+            function, first, second, controllers = panel.task()
+            assert (first.gap, second) == (1.0, other)
+    result = function(first, second, controllers, progress=lambda share, what: None)
+    assert "K_dyn" in result.html.replace("<sub>dyn</sub>", "_dyn")

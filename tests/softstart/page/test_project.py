@@ -1,0 +1,134 @@
+"""The project of a page: saved and opened to the bit, undone, and a refused file changes nothing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from softstart import Drive, Duty, InputError, TorqueProfile, optimize, simulate
+from softstart.controller import make_controller
+from softstart.controller.tuned import RobustGains
+from softstart.page.downloads import profile_file
+from softstart.page.project import project_of, take_file, take_text
+from softstart.page.session import Session
+from softstart.project import Project, StoredOptimum
+from softstart.project.parts import file_of, player_of
+
+CRANE = Drive.load("crane-4amtkf")
+PROFILE = TorqueProfile([0.0, 0.1, 0.1], [20.0, 50.0, 62.0])
+GAINS = RobustGains("robust", make_controller("ramp", {"time": 0.15}), CRANE)
+
+
+def worked_on() -> Session:
+    """A session with own gains, a profile, changed parameters, a duty and another gap."""
+    session = Session(controllers=["direct", "ramp", "s-curve"])
+    session.add("profile 1", player_of(PROFILE, "profile 1"))
+    session.add("ramp (robust)", GAINS)
+    session.select("ramp")
+    session.set_parameter("time", "200 ms")
+    session.set("shaft.gap", "0.7 rad")
+    session.set("limits.shaft_torque", "150 N*m")
+    take_text(session, Duty.load("travel-crane").to_toml(), "shift")
+    return session
+
+
+def figures(session: Session) -> dict[str, tuple[float, float]]:
+    """K_dyn and start time by label."""
+    return {
+        label: (session.result(label).k_dyn, session.result(label).start_time)
+        for label in session.inputs.controllers
+    }
+
+
+def test_a_saved_page_is_opened_with_the_same_numbers_and_undone(tmp_path: Path) -> None:
+    session = worked_on()
+    project_of(session).save(tmp_path / "job.toml")
+    other = Session("hoist-15kw", controllers=["direct", "ramp", "s-curve"])
+    before = other.inputs
+    take_file(other, (tmp_path / "job.toml").read_bytes(), "job.toml")
+    assert other.inputs.machine == session.inputs.machine
+    assert other.inputs.selected == "ramp"
+    assert figures(other) == figures(session)
+    assert other.inputs.duty == session.inputs.duty
+    assert other.inputs.controllers["ramp"].time == 0.2
+    assert other.changed == ("ramp",)
+    assert project_of(other) == project_of(session)
+    other.undo()
+    assert other.inputs is before
+    other.redo()
+    assert figures(other) == figures(session)
+    started = Session(Project.open(tmp_path / "job.toml"), ["direct", "ramp", "s-curve"])
+    assert figures(started) == figures(session)
+    assert started.steps == (0, 0)
+
+
+def test_what_the_page_writes_it_reads() -> None:
+    for content, name in (
+        (CRANE.replace(gap=1.0).to_toml(), "drive.toml"),
+        (file_of(GAINS), "robust.toml"),
+        (file_of(make_controller("ramp", {"time": 0.3})), "slow.toml"),
+        (Duty.load("travel-crane").to_toml(), "duty.toml"),
+        (project_of(worked_on()).to_toml(), "project.toml"),
+        *(
+            (profile_file(PROFILE, "mine", suffix, {"drive": "x"})[1], f"mine{suffix}")
+            for suffix in (".csv", ".toml")
+        ),
+    ):
+        session = Session(controllers=["direct", "ramp", "s-curve"])
+        take_file(session, content.encode(), name)
+        assert session.version == 1, name
+        added = session.inputs.controllers.get(Path(name).stem)
+        if added is not None:
+            own: Any = {"mine": player_of(PROFILE, "mine"), "robust": GAINS}.get(
+                Path(name).stem, make_controller("ramp", {"time": 0.3})
+            )
+            assert session.result(Path(name).stem).k_dyn == simulate(CRANE, own).k_dyn
+
+
+def test_a_pasted_profile_is_simulated_at_once_and_a_longer_one_is_refused() -> None:
+    session = Session(controllers=["direct"])
+    take_text(session, "time [ms]\ttorque [N m]\n0\t20,5\n100\t62\n", "pasted")
+    assert session.result("pasted").k_dyn == simulate(CRANE, ([0.0, 0.1], [20.5, 62.0])).k_dyn
+    before = session.inputs
+    with pytest.raises(
+        InputError, match=r'strategy "long": its torque changes until 100 s, and the start of '
+    ):
+        take_text(session, "time,torque\n0,20\n100,62\n", "long")
+    for text in (
+        "time,torque\n0,20\n0.1\n",
+        "version = 2",
+        "version = 1\n[[machine]]\nname = 'x'",
+        "kind = 'robust set'",
+        'kind = "settings"\ncontroller = "profile"\n[parameters]\nfile = "/etc/passwd"\n',
+    ):
+        with pytest.raises(InputError):
+            take_text(session, text, "wrong")
+    assert session.inputs is before
+
+
+def test_another_drive_loses_nothing_of_a_project() -> None:
+    session = worked_on()
+    session.open(project_of(session).replace(notes="on site", customer="Harbour"))
+    session.set("shaft.gap", "0.9 rad")
+    take_text(session, Drive.load("conveyor-11kw").to_toml(), "conveyor")
+    project = project_of(session)
+    assert [one.name for one in project.machines] == [Drive.load("conveyor-11kw").name, CRANE.name]
+    assert project.single(CRANE.name).gap == 0.9
+    assert {one.name for one in project.strategies} >= {"profile 1", "ramp (robust)"}
+    assert (project.notes, project.customer) == ("on site", "Harbour")
+    session.undo()
+    assert session.inputs.machine.gap == 0.9
+    session.remove("profile 1")
+    assert "profile 1" not in [one.name for one in project_of(session).strategies]
+
+
+def test_an_optimum_keeps_its_claims_on_the_page() -> None:
+    fast = CRANE.replace(target_speed=60.0, name="fast")
+    best = optimize(fast, 0.2883042)
+    stored = StoredOptimum.of(best, "best", "fast")
+    session = Session(Project.new(fast).with_part(stored), ["direct"])
+    assert session.result("best").k_dyn == best.k_dyn
+    assert project_of(session).optima == (stored,)
+    assert project_of(session).strategies == ()
