@@ -7,6 +7,7 @@ import html
 import math
 import re
 from functools import cache
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,6 +20,7 @@ from softstart import (
     compare,
     fatigue,
     optimize,
+    pareto,
     report,
     scenarios_of,
     simulate,
@@ -29,7 +31,8 @@ from softstart.input.gear import NO_GEAR, NO_OUTPUT, Gear
 from softstart.quantities import RefusedError
 from softstart.reporting.document import data_of, strategies
 from softstart.views.fatigue import fatigue_tables
-from softstart.views.numbers import TextTable, seen_at
+from softstart.views.identification import plan_table
+from softstart.views.numbers import TextTable, seen_at, units_of
 from softstart.views.optima import optimum_sheet, scenario_table
 from softstart.views.starts import comparison_table, machine_lines, run_sheet
 from softstart.views.tuning import tuning_sheet
@@ -254,3 +257,22 @@ def test_scenarios_of_an_optimum_are_at_the_output_too() -> None:
     check(table, "gap", gear, [0.5, 1.0])
     check(table, "J2", gear, [drive.J2] * 2)
     check(table, "Mc", gear, [drive.Mc] * 2)
+
+
+def test_csv_files_and_saved_results_know_no_shaft(tmp_path: Path) -> None:
+    """A plan and a saved curve are the same at either shaft."""
+    drive = Drive.load("crane-4amtkf").replace(gear_ratio=38.1, start_position="mid-gap")
+    there = seen_at(drive, "output")
+    plan = SimpleNamespace(
+        drive=there, experiments=[SimpleNamespace(name="start", widths={}, peak=50.0, travel=3.0, end=1.0)]
+    )
+    assert plan_table(plan).rows == [
+        ["peak shaft torque, N m", "50"],
+        ["load moves, rad", "3"],
+        ["lasts, s", "1"],
+    ]
+    assert plan_table(plan, units_of(there)).rows[0] == ["peak shaft torque, N m", "1.9e+03"]
+    state = tmp_path / "state.sqlite"
+    first, second = (pareto(one, [0.45], controllers=["direct"], save_to=state) for one in (drive, there))
+    assert first.summary() == second.summary()
+    assert "at the motor shaft" in first.points[0].bound_covers

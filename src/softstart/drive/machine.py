@@ -315,6 +315,18 @@ class Machine(ABC):
         """Sentences on what the model leaves out that decides its shaft torques."""
 
     @property
+    def saved_as(self) -> str:
+        """The file without its units, which change no result: what saved results belong to.
+
+        >>> from softstart import Drive
+        >>> crane = Drive.load("crane-4amtkf")
+        >>> crane.replace(units="deg, kN m").saved_as == crane.saved_as
+        True
+        """
+        machine: Any = self
+        return str(machine.replace(units="").to_toml())
+
+    @property
     @abstractmethod
     def identity(self) -> dict[str, object]:
         """What the summary of a start says about the machine."""

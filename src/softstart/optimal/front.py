@@ -290,8 +290,8 @@ def pareto(
     own = [run.start_time for run in runs if not math.isnan(run.start_time)]
     inputs = {
         "version of softstart": __version__,
-        "drive": drive.to_toml(),
-        "base drive": base.to_toml() if base else "",
+        "drive": drive.saved_as,
+        "base drive": base.saved_as if base else "",
         "terminal": terminal,
         "torque-speed limit": [list(corner) for corner in torque_speed],
         "smoothness": float(smoothness),

@@ -16,7 +16,6 @@ from softstart.chain.machines import as_machine
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.quantities import read_multiple, time_above_0
-from softstart.views.numbers import units_of
 
 if TYPE_CHECKING:
     from softstart.start.run import Run
@@ -236,10 +235,9 @@ class Problem:
 
     @property
     def torques(self) -> str:
-        """Smallest and largest motor torque as the machine is seen: "0 to 62 N m"."""
-        units = units_of(self.drive)
-        low, high = (units.shown(one, "N*m") for one in (self.lowest_torque, self.highest_torque))
-        return f"{low:g} to {high:g} {units.label('N*m')}"
+        """Smallest and largest motor torque in words that are saved with a result: "0 to 62 N m"."""
+        where = " at the motor shaft" if self.drive.gear else ""
+        return f"{self.lowest_torque:g} to {self.highest_torque:g} N m{where}"
 
     @property
     def highest_torque(self) -> float:

@@ -121,7 +121,7 @@ class TuningProblem:
         )  # fmt: skip
         return {
             "version of softstart": __version__,
-            "drive": self.drive.to_toml(),
+            "drive": self.drive.saved_as,
             "controller": self.recipe.about(),
             "free parameters": [repr(one) for one in self.ranges],
             "tolerances": [repr(sorted(one.items())) for one in self.scenarios],

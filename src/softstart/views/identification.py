@@ -17,7 +17,7 @@ from softstart.identification.result import AT_LIMIT
 from softstart.identification.wear import YEAR
 from softstart.quantities import Units
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, TextTable, number, seen, short, titled, units_of
+from softstart.views.numbers import IN_SI, NOTHING, TextTable, number, seen, short, titled, units_of
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 
 if TYPE_CHECKING:
@@ -154,9 +154,9 @@ def identification_figure(found: Identification) -> Figure:
     return made
 
 
-def plan_table(plan: ExperimentPlan) -> TextTable:
+def plan_table(plan: ExperimentPlan, units: Units = IN_SI) -> TextTable:
     """Half an interval of 95 % of each parameter, in %, under each experiment."""
-    shown, units = plan.experiments, units_of(plan.drive)
+    shown = plan.experiments
     rows = [
         [UNITS[name][0], *(f"{100.0 * one.widths[name]:.2g}".replace("inf", "unknown") for one in shown)]
         for name in shown[0].widths
@@ -175,8 +175,7 @@ def plan_sheet(plan: ExperimentPlan) -> Sheet:
     """What is shown of a plan of experiments."""
     lines = float(plan.drive.encoder_lines)
     encoder = f"{lines:g} encoder lines" if lines else "an ideal encoder"
-    table = plan_table(plan)
-    files: dict[str, str | Writer] = {"plan.csv": table_file(table)}
+    files: dict[str, str | Writer] = {"plan.csv": table_file(plan_table(plan))}
     for one in plan.experiments:
         stem = one.name.replace(", ", "-").replace(" ", "-")
         files |= {f"{stem}.csv": one.profile.to_csv, f"{stem}.toml": one.profile.to_toml}
@@ -190,7 +189,7 @@ def plan_sheet(plan: ExperimentPlan) -> Sheet:
             f"  a sample each {1e3 * plan.log_period:g} ms, {encoder}, a torque error of "
             f"{_torque(plan.ripple, plan.drive)} in each",
         ],
-        tables=[table],
+        tables=[plan_table(plan, units_of(plan.drive))],
         conclusions=[
             f'Smallest intervals: "{plan.best.name}"{f"; {lost} not identifiable" if lost else ""}.'
         ],
@@ -245,25 +244,28 @@ def wear_conclusion(wear: Wear) -> list[str]:
     return said
 
 
-def wear_sheet(wear: Wear) -> Sheet:
-    """What is shown of wear."""
-    drive, units = wear.found[-1].drive, units_of(wear.found[-1].drive)
-
+def wear_table(wear: Wear, units: Units = IN_SI) -> TextTable:
+    """The gap at each date, with its interval."""
     gaps = [
         [str(day), name, *(_digits(value, one) for value in (one.value, one.lower, one.upper))]
         for day, name, gap in zip(wear.dates, wear.names, wear.gaps, strict=True)
         for one in (_in_units(gap, "rad", units),)
     ]
     title, heading = titled("Gap, with intervals of 95 %", units), f"gap {units.label('rad')}"
-    table = TextTable.of_rows(title, ("date", "identification"), (heading, "from", "to"), gaps)
+    return TextTable.of_rows(title, ("date", "identification"), (heading, "from", "to"), gaps)
+
+
+def wear_sheet(wear: Wear) -> Sheet:
+    """What is shown of wear."""
+    drive = wear.found[-1].drive
     return Sheet(
         f"{drive.name}: wear of the gap",
         [f"{drive.name}: wear from {wear.dates[0]} to {wear.dates[-1]}"],
-        tables=[table],
+        tables=[wear_table(wear, units_of(drive))],
         conclusions=wear_conclusion(wear),
         notes=wear.notes,
         figures={"wear": partial(wear_figure, wear)},
-        files={"wear.csv": table_file(table)},
+        files={"wear.csv": table_file(wear_table(wear))},
         machine=drive,
     )
 
