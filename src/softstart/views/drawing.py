@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.arrays import Matrix, Vector
-from softstart.controller.finding import ready_controller_names
 from softstart.input.files import write_whole
 from softstart.views.numbers import cut
 
@@ -167,6 +166,8 @@ def strategy_colours(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     >>> strategy_colours(["ramp"])["ramp"] == strategy_colours(["direct", "mine", "ramp"])["ramp"]
     True
     """
+    from softstart.controller.finding import ready_controller_names  # a start takes longer to import
+
     order = dict.fromkeys([*ready_controller_names(), *names])
     places = {name: STRATEGIES[place % len(STRATEGIES)] for place, name in enumerate(order)}
     return {name: places[name] for name in names}
