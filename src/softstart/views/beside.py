@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from softstart.start.beside import SideBySide
 from softstart.views.drawing import COLOURS, GREY, drawing, mark_points, new_figure
-from softstart.views.numbers import DataColumn, TextTable, units_of
+from softstart.views.numbers import DataColumn, TextTable, titled, units_of
 from softstart.views.sheet import Sheet, records_file
 from softstart.views.starts import PEAK_COLUMNS, TIME_COLUMNS, machine_lines
 
@@ -27,15 +27,17 @@ def beside_table(both: SideBySide, title: str = "") -> TextTable:
     """The strategies, each figure for both machines."""
     rows = sorted(both.pairs, key=lambda pair: float(pair[0].run.k_dyn))
     columns = [DataColumn("strategy", _of(DataColumn("", lambda row: row.marked), 0))]
-    units = [units_of(one.drive) for one in both.machines]
+    first, second = (units_of(one.drive) for one in both.machines)
+    seen = first, first._replace(gear=second.gear)  # two columns of one figure are in one unit
+    alike = bool(first.gear) == bool(second.gear)
     for figure in FIGURES:
-        for k, column in enumerate(map(figure.seen, units)):
-            heading = f"{column.heading}{units[k].at if figure.si else ''}\n{LETTERS[k]}"
+        for k, column in enumerate(map(figure.seen, seen)):
+            heading = f"{column.heading}\n{LETTERS[k]}{'' if alike or not figure.si else seen[k].at}"
             columns.append(column._replace(heading=heading, of=_of(column, k), si=""))
     if any(row.against_limits for pair in both.pairs for row in pair):
         limits = DataColumn("limits", lambda row: row.against_limits)
         columns += [limits._replace(heading=f"limits\n{LETTERS[k]}", of=_of(limits, k)) for k in (0, 1)]
-    return TextTable.of_data(title, columns, rows)
+    return TextTable.of_data(titled(title, first) if alike else title, columns, rows)
 
 
 def _of(column: DataColumn, k: int) -> Callable[[Any], Any]:
