@@ -410,6 +410,8 @@ class Units(NamedTuple):
     ('kN*m/rad', 1.6, 8.594, ', at the output')
     >>> units.typed("1.6", "N*m"), units.typed("9 arcmin", "rad"), units.at_motor.typed("9", "rad")
     ('1.6 kN*m at output', '9 arcmin at output', '9 arcmin')
+    >>> units.typed("0.5x", "rad"), units.typed("2.5 J1", "kg*m^2")  # multiples are the same at both
+    ('0.5x', '2.5 J1')
     """
 
     angle: str = "rad"
@@ -544,7 +546,7 @@ class Units(NamedTuple):
 _SHAFT = re.compile(r"at\s+(?:the\s+)?(output|motor)(?:\s+shaft)?", re.IGNORECASE)
 _OF_TORQUE = ("N*m", "N*m/s", "N*m/rad", "N*m*s/rad")
 # a number with or without a unit: no list, no multiple ("2x", "5 J1"), and not already "at output"
-_QUANTITY = re.compile(rf"{_NUMBER.pattern}(?!\s*(?:x|J1)$)(?:(?!\sat\s)[^,;])*", re.IGNORECASE)
+_QUANTITY = re.compile(rf"(?>{_NUMBER.pattern})(?!\s*(?:x|J1)$)(?:(?!\sat\s)[^,;])*", re.IGNORECASE)
 
 
 def _same_unit(written: str) -> dict[str, Any]:
