@@ -69,7 +69,7 @@ def test_no_result_prints_its_arrays():
     found = [*OneLine.__subclasses__(), *Result.__subclasses__()]
     assert len(found) > 25
     own = {one.__name__ for one in found if "__repr__" in vars(one)}
-    assert own == {"Result", "Run", "Comparison", "Optimum", "LinearView", "Report"}
+    assert own == {"Result", "Run", "Comparison", "Optimum", "LinearView", "Report", "ParameterSheet"}
 
 
 def test_a_result_draws_its_main_panel_on_given_axes():
