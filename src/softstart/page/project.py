@@ -31,7 +31,9 @@ LONGEST_NAME = 60
 
 
 def project_of(session: Session) -> Project:
-    """All that the page holds: the machine as it is now in the place of the one chosen, and own strategies.
+    """The project as the page has it now, with its own strategies.
+
+    The machine that is chosen is saved as it has been changed on the page.
 
     >>> from softstart.page.session import Session
     >>> session = Session("hoist-15kw")
