@@ -140,8 +140,7 @@ class Controls:
         self._frames.mistakes.clear()
 
     def _hello(self, stored: object, link: object) -> None:
-        """A reloaded page goes on with the inputs that its tab has stored, or those of its address."""
-        self._frames.sent.clear()
+        """The page is there; reloaded, it goes on with what its tab has stored, or with its address."""
         if isinstance(stored, Mapping) and stored.get("server") == SERVER and stored.get("link") == link:
             inputs = links.stored(str(stored.get("name")), str(link))
             if inputs is not None:

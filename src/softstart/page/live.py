@@ -24,10 +24,11 @@ __all__ = ["Frame", "Live"]
 
 
 class Live:
-    """Sends frames by `send(number, frame)` as long as `run` runs.
+    """Sends frames by `send(number, frame)` as long as `run` runs, the first one when it is poked.
 
-    `poke` says that something changed, `drawn(number)` that the browser has drawn a frame. Frames are
-    numbered from 1; a quick frame has the number 0 and is not answered.
+    The browser's hello is that: fields built before it would be built again after it, and a hand that has
+    taken a slider meanwhile would lose it. `poke` says that something changed, `drawn(number)` that the
+    browser has drawn a frame. Frames are numbered from 1; a quick frame has the number 0 and is not answered.
     """
 
     def __init__(
@@ -69,8 +70,7 @@ class Live:
         return self._sent - self._answered
 
     async def run(self) -> None:
-        """Send frames until cancelled. What goes wrong is shown and does not end it."""
-        self._changed.set()
+        """Send frames from the first poke until cancelled. What goes wrong is shown and does not end it."""
         while True:
             await self._changed.wait()
             self._changed.clear()

@@ -57,9 +57,12 @@ async def followed(session: Session, hand, line: Line | None = None) -> Line:
     line = line or Line()
     frames = FrameBuilder(session)
     live = line.live = Live(frames, line.send)
-    controls = Controls(session, frames, lambda: None)
+    controls = Controls(session, frames, live.poke)
     session.on_change(live.poke)
     task = asyncio.create_task(live.run())
+    await asyncio.sleep(0.01)
+    assert not line.frames  # a page that is not there yet would be built twice
+    controls.take({"what": "hello", "stored": None, "link": ""})
     try:
         await hand(controls, line)
     finally:
@@ -134,6 +137,7 @@ def test_what_fails_is_told_and_following_goes_on():
         whole, frames.main_frame = frames.main_frame, {}.popitem  # a KeyError
         line.live = Live(frames, line.send, told.append)
         task = asyncio.create_task(line.live.run())
+        line.live.poke()
         await until(lambda: told)
         frames.main_frame = whole
         line.live.poke()
