@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 44742, "tests": 30869}
+MOST = {"src, controllers": 44736, "tests": 30881}
 LONGEST_FILE = 560  # statements
 LONGEST_FUNCTION = 70  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef

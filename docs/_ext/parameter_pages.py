@@ -19,7 +19,7 @@ from softstart.input.parameters import REQUIRED
 from softstart.plugins import STUDIES, registered
 from softstart.study import find_study
 
-OUTPUT = {"": "", "value": "yes", "limit": "yes, without losses", "here": "always"}
+OUTPUT = {"": "", "value": "yes", "here": "always"}
 
 
 def drive_file() -> str:

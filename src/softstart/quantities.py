@@ -482,11 +482,6 @@ class Units(NamedTuple):
         """The same units at the motor shaft."""
         return self._replace(gear=None)
 
-    @property
-    def lossless(self) -> Units:
-        """The same units for limits, which are brought over without losses."""
-        return self._replace(gear=self.gear and self.gear.lossless)
-
     def of(self, si: str) -> str:
         """The unit in which a quantity of this SI unit is seen."""
         if si in _OF_TORQUE:

@@ -405,13 +405,13 @@ def test_peak_and_travel_are_those_of_a_simulation() -> None:
 
 
 def test_bounds_of_a_plan_at_the_output(monkeypatch: pytest.MonkeyPatch) -> None:
-    """20 turns of the motor for one of the output; a permissible torque comes over without losses."""
+    """20 turns of the motor for one of the output; a permissible torque goes with losses as any other."""
     bounds = {}
     monkeypatch.setattr(VirtualTest, "experiment", lambda *_: SimpleNamespace(peak=1.0))
     monkeypatch.setattr(VirtualTest, "optimised", lambda self, standard, *most: bounds.update(most=most))
     geared = TRUTH.replace(gear_ratio=20.0, gear_efficiency=0.8)
     plan_experiments(geared, max_torque="1.6 kN*m at output", max_travel="0.5 turn at output")
-    assert bounds["most"] == pytest.approx((1600.0 / 20.0, 20.0 * math.pi), rel=1e-14)
+    assert bounds["most"] == pytest.approx((1600.0 / 20.0 / 0.8, 20.0 * math.pi), rel=1e-14)
     plan_experiments(geared, max_torque="80 N*m", max_travel="10 turn")
     assert bounds["most"] == pytest.approx((80.0, 20.0 * math.pi), rel=1e-14)
     for name, value in (("max_torque", "1.6 kN*m at output"), ("max_travel", "1 turn at output")):

@@ -92,7 +92,6 @@ def test_multiples_lists_and_what_is_at_output_already_stay_as_typed() -> None:
         assert units.typed(text, "rad") == text
     assert units.typed("1.6e-3", "N*m") == "1.6e-3 kN*m at output"
     assert units.typed("20", "s") == "20"
-    assert math.isclose(units.lossless.shown(1600.0 / 38.1, "N*m"), 1.6, rel_tol=1e-14)
 
 
 def test_a_figure_of_a_start_is_at_the_output() -> None:

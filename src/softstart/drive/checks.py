@@ -106,7 +106,8 @@ def _symbols(values: Values) -> SimpleNamespace:
         ratio=get("motor_inertia") / get("load_inertia"), target=get("target_speed"),
         w1=get("initial_motor_speed"), w2=get("initial_load_speed"), rated=get("rated_torque"),
         power=get("rated_power"), speed=get("rated_speed"), permitted=get("permissible_torque"),
-        output=get("permissible_output_torque"), gear_ratio=get("gear_ratio"),
+        output=get("permissible_output_torque"),
+        to_output=Gear(get("gear_ratio"), values.get("gear_efficiency", 1.0), Mc).of_torques,
         slow=(left > 0.0) & ((b1 + b2) * get("target_speed") >= left),
         busy=get("permissible_start_time") * get("starts_per_hour"),  # s in an hour
         opening_late=_opening_late(values),
@@ -145,9 +146,9 @@ RULES: tuple[tuple[str, str, Callable[[Any], Any], str], ...] = (
     ("permissible_torque", "load_torque", lambda v: abs(v.torque) >= v.permitted,
      "at constant speed the shaft already carries {other}; give the permissible peak, at the motor shaft"),
     ("permissible_output_torque", "load_torque",
-     lambda v: np.maximum(abs(v.torque), v.Mc) * v.gear_ratio >= v.output,
+     lambda v: np.maximum(abs(v.torque), v.Mc) * v.to_output >= v.output,
      "at constant speed the output already carries more: {other} at the motor shaft, and the friction of the "
-     "load, times the gear ratio; give the permissible peak, at the output"),
+     "load, brought to the output; give the permissible peak, at the output"),
     ("permissible_torque", "load_friction", lambda v: (abs(v.torque) < v.permitted) & (v.Mc >= v.permitted),
      "at constant speed the shaft already carries the load torque and {other}; give the permissible peak, at "
      "the motor shaft"),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from softstart.input.gear import Gear
 from softstart.input.parameters import Parameter, Wording
 
 # what stands there changes no start
@@ -73,7 +74,7 @@ class Limit:
     """One limit of a drive: its name and unit, the figure of a start that it bounds, how large that may be.
 
     `most` is an array where the limit differs from start to start. It bounds `scale` times the figure: of a
-    torque at the output that is the gear ratio.
+    torque at the output that is the factor by which the gear brings torques there.
     """
 
     name: str
@@ -111,10 +112,10 @@ class Limits:
     used_torque : float or None
         What a start may use of the permissible torques of the shafts of a chain, %: 100 where one is given.
     output_torque : float or None
-        Permissible peak of the torque at the output of the gear, N m there. It is checked without losses, the
-        safe side: `shaft_torque` is at most `output_torque/ratio`.
-    ratio : float or None
-        That of the gear.
+        Permissible peak of the torque at the output of the gear, N m there: `shaft_torque` is at most
+        `output_torque/to_output`.
+    to_output : float or None
+        Torque at the output over that at the motor shaft, with losses: i eta, or i/eta where the load drives.
     """
 
     shaft_torque: float | None = None
@@ -124,7 +125,7 @@ class Limits:
     fatigue: SNCurve | None = None
     used_torque: float | None = None
     output_torque: float | None = None
-    ratio: float | None = None
+    to_output: float | None = None
 
     @property
     def starts(self) -> float | None:
@@ -140,11 +141,11 @@ class Limits:
     @property
     def each(self) -> tuple[Limit, ...]:
         """The limits that there are; of the life the share in per cent that the starts asked for use."""
-        output, ratio = self.output_torque, self.ratio
+        output, factor = self.output_torque, self.to_output
         torque = Limit("shaft torque", "N m", "peak_torque", self.shaft_torque)
-        if output is not None and ratio is not None and np.all(self.shaft_torque == output / ratio):
+        if output is not None and factor is not None and np.all(self.shaft_torque == output / factor):
             # where the output decides, it is told there
-            torque = Limit("output torque", "N m", "peak_torque", output, ratio)
+            torque = Limit("output torque", "N m", "peak_torque", output, factor)
         limits = (
             torque,
             Limit("permissible torque", "%", "used_torque", self.used_torque),
@@ -172,23 +173,23 @@ class Limits:
         return any(one is not None for one in given)
 
 
-def limits_of(values: Mapping[str, Any]) -> Limits:
-    """The limits among the values of a drive.
+def limits_of(values: Mapping[str, Any], gear: Gear | None = None) -> Limits:
+    """The limits among the values of a drive with this gear.
 
-    >>> limits = limits_of({"permissible_output_torque": 1600.0, "gear_ratio": 40.0})
+    >>> limits = limits_of({"permissible_output_torque": 1600.0}, Gear(40.0, 0.8, load=5.0))
     >>> limits.shaft_torque, limits.each[0].name
-    (40.0, 'output torque')
+    (50.0, 'output torque')
     """
     slope, torques, cycles = (values.get(f"fatigue_{key}") for key in ("slope", "torque", "cycles"))
     points = tuple(sorted(zip(torques or (), cycles or (), strict=True), reverse=True))
     fatigue = SNCurve(slope, points) if slope is not None or points else None
     torque, output = values.get("permissible_torque"), values.get("permissible_output_torque")
-    ratio = values.get("gear_ratio")
-    if output is not None and ratio is not None:  # the stricter of two
-        torque = output / ratio if torque is None else np.minimum(torque, output / ratio)
+    factor = None if gear is None else gear.of_torques
+    if output is not None and factor is not None:  # the stricter of two
+        torque = output / factor if torque is None else np.minimum(torque, output / factor)
     return Limits(
         torque, values.get("permissible_start_time"), values.get("starts_per_hour"),
-        values.get("required_life"), fatigue, None, output, ratio,
+        values.get("required_life"), fatigue, None, output, factor,
     )  # fmt: skip
 
 

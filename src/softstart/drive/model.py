@@ -214,7 +214,7 @@ class Drive(ParameterFile, Machine):
         "time from the command until the brake is open", '"100 ms"', "0 or more", default=0.0)
     permissible_torque: MaybeNumber = parameter("limits.shaft_torque", "N*m",
         "permissible peak of the shaft torque at the motor shaft", '"130 N*m"', "above 0", default=None,
-        at_output="limit")
+        at_output="value")
     permissible_output_torque: MaybeNumber = parameter("limits.output_torque", "N*m",
         "permissible peak of the torque at the output of the gear", '"1.6 kN*m"', "above 0", default=None,
         at_output="here")
@@ -228,7 +228,7 @@ class Drive(ParameterFile, Machine):
         "above 0", default=None, label="slope of S-N")
     fatigue_torque: MaybeSeries = parameter("limits.fatigue.torque", "N*m",
         "torque of the points of the S-N curve", '"90 N*m"', "above 0", default=None, many=True,
-        label="S-N torque", at_output="limit")
+        label="S-N torque", at_output="value")
     fatigue_cycles: MaybeSeries = parameter("limits.fatigue.cycles", "1",
         "number of cycles at the points of the S-N curve", "2e6", "above 0", default=None, many=True,
         label="S-N cycles")
@@ -481,14 +481,9 @@ class Drive(ParameterFile, Machine):
         """The gear, between the motor shaft, at which everything counts, and the output; None without ratio.
 
         >>> Drive.load("crane-4amtkf").replace(gear_ratio=38.1, gear_efficiency="95 %").gear
-        Gear(ratio=38.1, efficiency=0.95, load=None)
+        Gear(ratio=38.1, efficiency=0.95, load=7.16)
         """
-        return None if self.gear_ratio is None else Gear(self.gear_ratio, self.gear_efficiency)
-
-    def gear_of(self, p: Parameter) -> Gear:
-        """The gear as values of this parameter go through it: limits without losses, load torques as one."""
-        gear = self.gear or Gear(1.0)
-        return {"limit": gear.lossless, "value": gear._replace(load=self.Mc)}.get(p.at_output, gear)
+        return None if self.gear_ratio is None else Gear(self.gear_ratio, self.gear_efficiency, self.Mc)
 
     def gear_with(self, **given: object) -> Gear | str:
         """What "... at output" goes through in values that are to be set, or why there is nothing.
@@ -503,26 +498,24 @@ class Drive(ParameterFile, Machine):
     def at_output(self) -> dict[str, Any]:
         """The values of the drive that may be given at the output, in SI *there*, by name; {} without a gear.
 
-        Of limits without losses, the safe side.
-
         >>> geared = Drive.load("crane-4amtkf").replace(gear_ratio=38.1, gear_efficiency=0.95)
         >>> sheet = geared.replace(gap="9 arcmin at output", stiffness="35 kN*m/rad at output")
         >>> round(sheet.stiffness, 3), [round(sheet.at_output[name], 9) for name in ("stiffness", "gap")]
         (25.38, [35000.0, 0.002617994])
         """
-        if self.gear is None:
+        if (gear := self.gear) is None:
             return {}
         values = dict[str, Any]()
         for name, p in PARAMETERS.items():
-            value, through = getattr(self, name), self.gear_of(p)
+            value = getattr(self, name)
             if p.at_output == "here":
                 values[name] = value
             elif p.at_output and not isinstance(value, str) and value is not None:
                 several = isinstance(value, tuple)
                 values[name] = (
-                    tuple(through.to_output(np.array(value), p.unit).tolist())
+                    tuple(gear.to_output(np.array(value), p.unit).tolist())
                     if several
-                    else through.to_output(value, p.unit)
+                    else gear.to_output(value, p.unit)
                 )
         return {name: value for name, value in values.items() if value is not None}
 
@@ -656,7 +649,7 @@ class Drive(ParameterFile, Machine):
         >>> Drive.load("crane-4amtkf").replace(permissible_torque="130 N*m").limits.shaft_torque
         130.0
         """
-        return limits_of(vars(self))
+        return limits_of(vars(self), self.gear)
 
     @property
     def stiffnesses(self) -> Vector:

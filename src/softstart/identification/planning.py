@@ -146,7 +146,7 @@ def plan_experiments(
         The parameters that the planned torque is to tell best; all that are to be found by default.
     max_torque : float or str, optional
         Largest shaft torque that a planned experiment may have, N m; by default the permissible one of the
-        drive, or else the largest of the standard experiments. "at output" it is brought over without losses.
+        drive, or else the largest of the standard experiments.
     max_travel : float or str, optional
         How far the load may be moved, rad at the motor shaft, or "1 turn at output"; no limit by default.
     optimise : bool
@@ -190,7 +190,6 @@ def plan_experiments(
         torque = drive.limits.shaft_torque or max(one.peak for one in experiments)
         travel = math.inf
         if max_torque is not None:
-            # a limit, as that of the drive: "at output" without losses
             most = quantity_of(drive, "permissible_torque", max_torque, "max_torque")
             torque = _between("max_torque", most, "N*m")
         if max_travel is not None:

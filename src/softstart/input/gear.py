@@ -33,9 +33,10 @@ class Gear(NamedTuple):
     """What lies between motor shaft and output: the ratio i (turns of the motor for one of the output), eta.
 
     A torque M at the output is M/(i eta) at the motor shaft; an inertia, a stiffness and a damping are
-    divided by i^2 eta, an angle and a speed multiplied by i. A torque below 0 drives the motor: it is
-    M eta/i there. Of parts of one torque, as lift and friction, the sign of the whole `load` counts: power
-    flows one way.
+    divided by i^2 eta, an angle and a speed multiplied by i. A load below 0 drives the motor: it is
+    M eta/i there. Power flows one way: all torques of a machine, of motor and shaft, parts of its load and
+    limits, go as its whole `load`, so that ratios among them are the same at both shafts. Without one a
+    torque goes by its own sign.
 
     >>> gear = Gear(40.0, 0.8)
     >>> gear.to_motor(1600.0, "N*m"), gear.to_motor(0.01, "rad"), gear.to_output(25.0, "N*m/rad")
@@ -66,7 +67,7 @@ class Gear(NamedTuple):
         return value / self.ratio if turns else value * self._factor(value, unit)
 
     def _factor(self, value: Any, unit: str) -> Any:
-        """The factor of a value, which of a torque goes with its sign, or with that of the whole."""
+        """The factor of a value, which of a torque goes with the sign of the load, or with its own."""
         drives = np.asarray(value if self.load is None else self.load) < 0.0
         if POWERS[unit] != (1, 1) or not np.any(drives):
             return self.factor(unit)
@@ -74,12 +75,13 @@ class Gear(NamedTuple):
         return either if either.ndim else float(either)
 
     @property
-    def lossless(self) -> Gear:
-        """The gear with an efficiency of 1, by which limits are brought over: the safe side.
+    def of_torques(self) -> Any:
+        """What a torque at the output is over the same at the motor shaft, whatever its sign.
 
-        What the output permits, M, is M/i at the motor shaft: losses would permit more there.
+        >>> Gear(40.0, 0.8, load=5.0).of_torques, Gear(40.0, 0.8, load=-5.0).of_torques
+        (32.0, 50.0)
         """
-        return Gear(self.ratio)
+        return self.to_output(1.0, "N*m")
 
 
 def alike(values: Sequence[object]) -> None:

@@ -60,9 +60,8 @@ class Parameter:
     unit and `choices` is a quantity or one of these words. A `many` parameter is a list of numbers, an
     `infinite` one may be infinity. `example` is what to type. `table` is that of the file, "" above the first
     one; `name` is the keyword in Python, `label` what stands before its field, both by default the key.
-    `at_output` says whether the value may be written "at output" of the gear: as one that losses change
-    ("value"), as a limit, which is brought over without losses, or as one that is "here" anyway; one with a
-    "side" has the gear beside it.
+    `at_output` says whether the value may be written "at output" of the gear ("value"), or is "here" anyway;
+    one with a "side" has the gear beside it.
     """
 
     key: str
@@ -80,7 +79,7 @@ class Parameter:
     table: str = ""
     name: str = ""
     positional: bool = False
-    at_output: Literal["", "value", "limit", "here", "side"] = ""
+    at_output: Literal["", "value", "here", "side"] = ""
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -345,7 +344,7 @@ def at_motor(p: Parameter, value: object, gear: Gear | str = NO_GEAR) -> object:
     if p.at_output == "side" or isinstance(gear, str):
         raise RefusedError(OWN_SIDE if p.at_output == "side" else str(gear))
     number = parse(each if several else each[0], p.unit, infinite=p.infinite)
-    return (gear.lossless if p.at_output == "limit" else gear).to_motor(number, p.unit)
+    return gear.to_motor(number, p.unit)
 
 
 def _refuse(number: Value, allowed: bool | NDArray[np.bool_], reason: str) -> None:

@@ -556,7 +556,7 @@ def drawn(
             "motor": machine.motor_index,
             "load": machine.load_index,
             "target": units.shown(machine.target_speed, "rad/s"),
-            "allowed": json_number(float(units.lossless.shown(run.permissible_torque, "N*m"))),
+            "allowed": json_number(float(units.shown(run.permissible_torque, "N*m"))),
             "units": {
                 "angle": units.of("rad"),
                 "speed": units.of("rad/s"),

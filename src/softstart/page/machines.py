@@ -136,10 +136,10 @@ class FormField:
         >>> for path in ("load.torque", "limits.shaft_torque", "motor.starting_torque"):
         ...     print(fields[path].seen(units).shown(50.0, "N*m"))
         1600.0
-        2000.0
+        1600.0
         50.0
         """
-        return {"value": units, "limit": units.lossless}.get(self.at_output, units.at_motor)
+        return units if self.at_output == "value" else units.at_motor
 
 
 def parameter_fields(machine: Machine) -> Mapping[str, FormField]:

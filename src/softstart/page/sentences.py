@@ -123,7 +123,7 @@ def changes(old: Machine, new: Machine) -> list[Change]:
 
 def _value(change: Change, units: Units) -> str:
     value, si, p = change.old, change.parameter.unit, change.parameter
-    units = {"value": units, "limit": units.lossless}.get(p.at_output, units.at_motor)
+    units = units if p.at_output == "value" else units.at_motor
     if value is None or isinstance(value, str):
         return value or "not given"
     shown = unit(units.of(si))

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, pass_context
 from markupsafe import Markup, escape
 from matplotlib.patches import Rectangle
 
-from softstart.drive import Drive, Machine, plausibility
+from softstart.drive import Machine, plausibility
 from softstart.errors import fact_of, listed
 from softstart.input.parameters import Parameter
 from softstart.quantities import Units
@@ -345,10 +345,10 @@ def functions(report: Report) -> list[tuple[str, str]]:
 
 def there_of(drive: Machine, parameter: Parameter, numbers: list[float]) -> str:
     """Values of a parameter, as they are seen, at the output of the gear; "" where they have none there."""
-    through = drive.gear_of(parameter) if isinstance(drive, Drive) and drive.gear else None
-    if through is None or through.factor(parameter.unit) is None:
+    gear = drive.gear
+    if gear is None or gear.factor(parameter.unit) is None:
         return ""
-    return ", ".join(short(through.to_output(one, parameter.unit)) for one in numbers)
+    return ", ".join(short(gear.to_output(one, parameter.unit)) for one in numbers)
 
 
 def of_part(drive: Machine, path: str, parameter: Parameter) -> str:
@@ -379,8 +379,8 @@ def data_of(report: Report) -> tuple[str, list[list[str]], list[str]]:
         if numbers:
             text, there = ", ".join(map(short, numbers)), there_of(report.drive, parameter, numbers)
             if gear is not None and parameter.at_output == "here":  # and the motor shaft is the other one
-                exact = [gear.lossless.to_motor(exact[0], si)]
-                text, there = (text if at_output else short(gear.lossless.to_motor(numbers[0], si))), text
+                exact = [gear.to_motor(exact[0], si)]
+                text, there = (text if at_output else short(gear.to_motor(numbers[0], si))), text
         moved = units.is_at_output(si) or (at_output and parameter.at_output == "here")
         if path == "limits.life":
             hours = value / 3600.0

@@ -71,8 +71,8 @@ class Case:
 class Margin:
     """A limit and the worst figure beside it; `case` says where that is, "" on the drive as it is.
 
-    `figure` is that of the start; `value` is what the limit bounds: of a torque at the output the ratio times
-    the figure. A sentence has them in `units`, a torque at the output without losses.
+    `figure` is that of the start; `value` is what the limit bounds: of a torque at the output the figure
+    there. A sentence has them in `units`.
     """
 
     of: Limit
@@ -105,7 +105,7 @@ class Margin:
         """Name, value, limit and unit as a sentence has them."""
         if self.unit != "N m":
             return self.name, self.value, self.limit, self.unit
-        units = self.units.lossless if self.of.scale == 1.0 else self.units.at_motor  # it is there already
+        units = self.units if self.of.scale == 1.0 else self.units.at_motor  # it is there already
         name = self.name.replace("shaft", "output") if units.gear else self.name
         of_value, of_limit = (float(units.shown(one, "N*m")) for one in (self.value, self.limit))
         return name, of_value, of_limit, units.label("N*m")

@@ -78,7 +78,7 @@ def _there(machine: Machine, units: Units) -> Iterator[str]:
         through = f"i = {short(float(gear.ratio))}, eta = {short(float(gear.efficiency))}"
         _, J2, c, gap, Mc = _values(machine.lever_rule_model, units._replace(angle="arcmin", gear=gear))
         if units.gear:
-            yield f"  output all values are at the output of the gear, {through}; limits without losses"
+            yield f"  output all values are at the output of the gear, {through}"
         else:
             yield f"  output c = {c}, gap = {gap}, J2 = {J2}, Mc = {Mc}; {through}"
 

@@ -294,7 +294,7 @@ def duty_notes(run: DutyRun) -> Iterator[str]:
     if run.margins():
         yield "Margin: what a step leaves of the limit to which it comes nearest; negative: exceeded."
     if run.drive.limits.output_torque is not None or units_of(run.drive).gear:
-        yield "Limit of the output torque: shaft torque times the gear ratio, without losses, the safe side."
+        yield "Output torque: that of the shaft through the gear with its losses, as all torques there."
     if not run.repeated:
         yield "The duty ends in motion, so that its cycle is computed once."
     elif run.cycles == 1:
@@ -523,7 +523,7 @@ def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math
         axes.plot(t, units.shown(torque, "N*m"), label=name, **(line | {"lw": 0.9}))
     permissible = float(run.drive.permissible_torques[int(run.worst.peak_torques.argmax())])
     if not math.isnan(permissible):
-        most = units.lossless.shown(permissible, "N*m")
+        most = units.shown(permissible, "N*m")
         for sign, label in ((1.0, "permissible"), (-1.0, None)):
             axes.axhline(sign * most, color=LIMIT, lw=1.0, ls=DASHES[1], label=label)
     head(axes, f"K_dyn = {run.k_dyn:.3f} in step {name_of(run.worst)}", f"torque, {units.label('N*m')}")

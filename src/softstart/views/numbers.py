@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from softstart.drive import Drive, Machine
+from softstart.drive import Machine
 from softstart.input.parameters import Parameter
 from softstart.quantities import RefusedError, Units
 
@@ -317,15 +317,9 @@ def units_of(machine: Machine, given: Machine | None = None) -> Units:
 
 
 def units_for(machine: Machine, parameter: Parameter) -> Units:
-    """The units of a parameter of a machine: of a limit without losses, of load torques by the sign of all.
-
-    A value that is at the output in the file, as limits.output_torque, is there already.
-    """
+    """The units of a parameter of a machine; what is at the output in the file is there already."""
     units = units_of(machine)
-    if units.gear is None or not isinstance(machine, Drive):
-        return units
-    there = parameter.at_output == "here"
-    return units.at_motor if there else units._replace(gear=machine.gear_of(parameter))
+    return units.at_motor if parameter.at_output == "here" else units
 
 
 def seen_at(machine: Any, shaft: str) -> Any:
@@ -368,14 +362,15 @@ def gear_in_words(machine: Machine) -> str:
 
     >>> from softstart import Drive
     >>> gear_in_words(Drive.load("crane-4amtkf").replace(gear_ratio=38.0, gear_efficiency=0.95))
-    'At the output: torques times i eta, inertias, stiffness and damping times i^2 eta, angles and ...'
+    'At the output: torques, those of limits too, times i eta; inertias, stiffness and damping times ...'
     """
     if (gear := machine.gear) is None:
         return ""
+    torques = "i/eta, as the load drives the motor" if gear.load < 0.0 else "i eta"
     return (
-        "At the output: torques times i eta, inertias, stiffness and damping times i^2 eta, angles and "
-        f"speeds over i; i = {short(float(gear.ratio))}, eta = {short(float(gear.efficiency))}. A limit is "
-        "brought over with eta = 1, the safe side."
+        f"At the output: torques, those of limits too, times {torques}; inertias, stiffness and damping "
+        f"times i^2 eta; angles and speeds over i; i = {short(float(gear.ratio))}, "
+        f"eta = {short(float(gear.efficiency))}."
     )
 
 

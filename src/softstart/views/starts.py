@@ -424,7 +424,7 @@ def definitions(comparison: Comparison) -> list[str]:
         found.append(f"limits: the smallest margin in the worst of {cases}.")
         if comparison.drive.limits.output_torque is not None or units.gear:
             found.append(
-                "output torque: that of the shaft times the gear ratio, without losses, the safe side."
+                "output torque: that of the shaft through the gear with its losses, as all torques there."
             )
     if comparison.drive.brake == "motor":
         found.append("Times count from the command, so that they include the release of the brake.")

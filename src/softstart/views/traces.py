@@ -104,7 +104,7 @@ def shaft_torques(axes: Axes, run: Run) -> None:
 def permissible_line(axes: Axes, run: Run) -> None:
     """The permissible shaft torque, if there is one."""
     if not math.isnan(run.permissible_torque):
-        most = units_of(run.drive).lossless.shown(run.permissible_torque, "N*m")
+        most = units_of(run.drive).shown(run.permissible_torque, "N*m")
         axes.axhline(most, color=LIMIT, lw=1.0, ls=DASHES[1], label="permissible")
 
 
