@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
 import zipfile
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.page.conftest import INSTRUMENT, SOFTSTART, at_rest, comes_to, drawn
+from tests.page.conftest import INSTRUMENT, at_rest, comes_to, drawn
 
 from softstart import Chain, DataSheet, Drive, TorqueProfile, export_controller, parameter_sheet, simulate
 from softstart.controller import make_controller
@@ -151,19 +150,6 @@ def test_the_parameter_sheet_is_copied_as_a_text(visit: Any) -> None:
     comes_to(lambda: page.evaluate("navigator.clipboard.readText()"), wanted)
     name, content = saved(page, "parameters-file")
     assert (name, content.decode()) == ("crane-travel-drive-4amtkf-h-112l6-s-curve-parameters.txt", wanted)
-
-
-def test_a_report_is_printed_to_a4(browser: Any, tmp_path: Path) -> None:
-    words = ("report", "--controllers", "direct,ramp", "--budget", "0", "--pdf", str(tmp_path / "r.pdf"))
-    subprocess.run([SOFTSTART, *words], check=True, capture_output=True, cwd=tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["r.pdf"]
-    printed = (tmp_path / "r.pdf").read_bytes()
-    assert printed.startswith(b"%PDF-")
-    sheets = re.findall(rb"/MediaBox \[0 0 ([0-9.]+) ([0-9.]+)\]", printed)
-    assert 4 <= len(sheets) <= 10
-    for width, height in sheets:  # A4 in points
-        assert float(width) == pytest.approx(595.3, abs=1.0)
-        assert float(height) == pytest.approx(841.9, abs=1.0)
 
 
 def test_a_chain_file_takes_the_place_of_the_drive(files: Any) -> None:

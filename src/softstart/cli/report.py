@@ -91,7 +91,7 @@ def written_report(make: Callable[..., Report], to: str | None, pdf: str | None)
     for flag, path in (("--out", to), ("--pdf", pdf)):
         if path is not None:
             _check_file(flag, path)
-    browser = "" if pdf is None else _browser()
+    browser = "" if pdf is None else browser_that_prints()
     with working("starting the drive ...") as show, attributed():
         report = make(lambda share, what: show(f"{100.0 * share:.0f} %: {what}"), options.typed_command())
         show("drawing the figures")
@@ -101,8 +101,8 @@ def written_report(make: Callable[..., Report], to: str | None, pdf: str | None)
             write_whole(Path(to), lambda stream: stream.write(page))
         if pdf is not None:
             with working("printing ..."):
-                printed = _printed(page, browser)
-            write_whole(Path(pdf), lambda stream: stream.write(printed), binary=True)
+                content = printed(page, browser)
+            write_whole(Path(pdf), lambda stream: stream.write(content), binary=True)
     sheet, written = report.sheet, " and ".join(filter(None, (to, pdf)))
     return report.summary, replace(sheet, notes=[*sheet.notes, f"Written to {written}."])
 
@@ -164,7 +164,7 @@ def _check_file(option: str, out: str) -> None:
     raise InputError(f'{option} = "{out}": {reason}; name a file in a folder that is there, as {example}.')
 
 
-def _browser() -> str:
+def browser_that_prints() -> str:
     """The browser that prints: that of SOFTSTART_CHROMIUM, or one that is installed."""
     named = os.environ.get("SOFTSTART_CHROMIUM")
     browser = next(filter(None, map(shutil.which, [named] if named else BROWSERS)), None)
@@ -177,7 +177,7 @@ def _browser() -> str:
     return named or browser
 
 
-def _printed(page: str, browser: str) -> bytes:
+def printed(page: str, browser: str) -> bytes:
     """The page as PDF, printed by the browser without a window."""
     with tempfile.TemporaryDirectory(prefix="softstart-print-", ignore_cleanup_errors=True) as folder:
         source, target = Path(folder, "report.html"), Path(folder, "report.pdf")

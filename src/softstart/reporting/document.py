@@ -79,18 +79,20 @@ FUNCTIONS = {
 _BEFORE_UNIT = re.compile(
     r"(?<=[\d,]) (?=(?:k?N\xa0m|kg\xa0m|lbf|ms|s|rad|deg|arcmin|rpm|mm|Hz|kW|W|%)(?!\w))"
 )
+_KEY = re.compile(r"\b[a-z]+(?:_[a-z]+)+(?= \d)")  # of a parameter, before its value
 _DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
 
 
 def typeset(text: object, comma: bool = False) -> Markup:
-    """A text as HTML in which no line ends before a unit, with K_dyn set as such and decimal commas if asked.
+    """A text as HTML: no break before a unit, K_dyn is set as such, keys are words; decimal commas if asked.
 
-    >>> print(typeset("K_dyn < 0.98 in 1 s", comma=True).replace("\\xa0", "~"))
-    K<sub>dyn</sub> &lt; 0,98 in 1~s
+    >>> print(typeset("K_dyn < 0.98 in 1 s, full_torque 62", comma=True).replace("\\xa0", "~"))
+    K<sub>dyn</sub> &lt; 0,98 in 1~s, full torque 62
     """
     if isinstance(text, Markup):
         return text
     shown = re.sub(r"\b(k?N|kg) m(?=\b|²)", "\\1\xa0m", "" if text is None else str(escape(text)))
+    shown = _KEY.sub(lambda key: key[0].replace("_", " "), shown)
     shown = with_comma(_BEFORE_UNIT.sub("\xa0", shown), comma)
     return Markup(shown.replace("K_dyn", "K<sub>dyn</sub>"))
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from softstart.start.beside import SideBySide
-from softstart.views.drawing import COLOURS, GREY, drawing, mark_points, new_figure
+from softstart.views.drawing import GREY, MARKERS, drawing, mark_points, new_figure, strategy_colours
 from softstart.views.numbers import DataColumn, TextTable, titled, units_of
 from softstart.views.sheet import Sheet, records_file
 from softstart.views.starts import PEAK_COLUMNS, TIME_COLUMNS, machine_lines
@@ -58,9 +58,11 @@ def draw_beside(axes: Axes, both: SideBySide) -> None:
     points = [tuple((row.run.settled_time, row.run.k_dyn) for row in pair) for pair in pairs]
     names = [row.name for row, _ in pairs]
     mark_points(axes, [(name, *one) for name, (one, _) in zip(names, points, strict=True)], range(len(names)))
-    for index, (one, other) in enumerate(points):
+    colours = strategy_colours(names)
+    for index, (name, (one, other)) in enumerate(zip(names, points, strict=True)):
+        marker = MARKERS[index % len(MARKERS)]
         axes.plot(*zip(one, other, strict=True), color=GREY, lw=0.8, zorder=1)
-        axes.plot(*other, "s", mfc="none", color=COLOURS[(index + 1) % len(COLOURS)], zorder=2)
+        axes.plot(*other, marker, ms=8, mfc="none", mew=1.8, color=colours[name][0], zorder=3)
     axes.set_xlabel("settled time, s")
     axes.set_ylabel("K_dyn")
     axes.set_title("filled: A, hollow: B", loc="left")

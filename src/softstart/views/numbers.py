@@ -40,7 +40,7 @@ class Column(NamedTuple):
         >>> Column("peak\nN m").in_a_line, Column("start\ntime s").in_a_line, Column("K_dyn").in_a_line
         ('peak, N m', 'start time, s', 'K_dyn')
         """
-        return re.sub(UNIT_BEHIND, ", ", self.heading.replace("\n", " "))
+        return re.sub(UNIT_BEHIND, ", ", self.heading.replace("-\n", "").replace("\n", " "))
 
     def width(self, cells: Sequence[str]) -> int:
         """Letters that the column needs."""
