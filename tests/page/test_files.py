@@ -65,6 +65,8 @@ def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
 
 def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     """The report is computed aside; meanwhile everything else goes on."""
+    files.get_by_test_id("project-names").click()
+    files.get_by_test_id("project-customer").fill("Harbour <&> Co")
     with files.expect_download(lambda it: it.suggested_filename.endswith(".html"), timeout=120_000) as report:
         files.get_by_test_id("report-go").click()
         name, content = saved(files, "export-traces")
@@ -85,9 +87,21 @@ def test_report_traces_and_command_line(files: Any, tmp_path: Path) -> None:
     assert report.value.suggested_filename == "crane-travel-drive-4amtkf-h-112l6-report.html"
     assert html.lstrip().lower().startswith("<!doctype html")
     assert CRANE.name in html
+    assert "Harbour &lt;&amp;&gt; Co" in html
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     name, content = saved(files, "report-file")
     assert (name, content.decode()) == (report.value.suggested_filename, html)
+
+
+def test_a_report_is_saved_as_pdf_with_another_machine(files: Any) -> None:
+    files.get_by_test_id("report-kind").click()
+    files.get_by_role("option", name="PDF").click()
+    files.get_by_test_id("report-beside").click()
+    files.get_by_role("option", name="conveyor-11kw").click()
+    with files.expect_download(timeout=180_000) as download:
+        files.get_by_test_id("report-go").click()
+    assert download.value.suggested_filename == "crane-travel-drive-4amtkf-h-112l6-report.pdf"
+    assert Path(download.value.path()).read_bytes().startswith(b"%PDF-")
 
 
 def test_what_the_page_saves_of_a_strategy_it_loads(files: Any, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from tests.page.conftest import SOFTSTART
 
 from softstart import DataSheet, Report, report
-from softstart.cli.report import browser_that_prints, printed
+from softstart.reporting.printing import browser_that_prints, printed
 from softstart.views.numbers import seen_at
 
 FILLED = 0.8  # of the height between the margins, of each page but the last: no block is higher than a fifth

@@ -84,7 +84,7 @@ def _shown(project: Project, path: str, check: bool = False) -> tuple[Any, Any]:
     checks = {}
     with working("starting the optima ..."), attributed():
         for one in project.optima if check else ():
-            checks[one.name] = max(run.k_dyn for run in one.checked(project.single(one.machine)))
+            checks[one.name] = max(run.k_dyn for run in one.checked(*map(project.single, one.machines)))
     sheet = project_sheet(project, checks)
     steps = [
         ("serve", [], "the interactive page"),

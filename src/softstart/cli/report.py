@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,15 +18,6 @@ if TYPE_CHECKING:
     from softstart.drive.machine import Machine
     from softstart.identification.result import Identification
     from softstart.reporting import Report
-
-BROWSERS = (
-    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
-    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
-    "/Applications/Chromium.app/Contents/MacOS/Chromium",
-    "C:/Program Files/Google/Chrome/Application/chrome.exe",
-    "C:/Program Files (x86)/Microsoft/Edge/Application/msedge.exe",
-)
-PRINTING = 120.0  # s for a browser to print a report
 
 
 @command("report")
@@ -88,6 +76,8 @@ def written_report(make: Callable[..., Report], to: str | None, pdf: str | None)
     """The report of `make(progress, command)`, written to the files of --out and --pdf."""
     if to is None and pdf is None and not option_value("as_json"):
         raise InputError("--out: name the file to write, as --out report.html (or ask for --json).")
+    from softstart.reporting.printing import browser_that_prints, printed
+
     for flag, path in (("--out", to), ("--pdf", pdf)):
         if path is not None:
             _check_file(flag, path)
@@ -162,38 +152,3 @@ def _check_file(option: str, out: str) -> None:
         except OSError as error:
             reason = f"the file cannot be written there ({error.strerror or error})"
     raise InputError(f'{option} = "{out}": {reason}; name a file in a folder that is there, as {example}.')
-
-
-def browser_that_prints() -> str:
-    """The browser that prints: that of SOFTSTART_CHROMIUM, or one that is installed."""
-    named = os.environ.get("SOFTSTART_CHROMIUM")
-    browser = next(filter(None, map(shutil.which, [named] if named else BROWSERS)), None)
-    if browser is None:
-        what = f'SOFTSTART_CHROMIUM = "{named}": there is no such program' if named else "--pdf: no browser"
-        raise InputError(
-            f"{what} to print with; install Chromium, Chrome or Edge (Debian: apt-get install chromium), "
-            "name it in SOFTSTART_CHROMIUM, or print the file of --out in any browser."
-        )
-    return named or browser
-
-
-def printed(page: str, browser: str) -> bytes:
-    """The page as PDF, printed by the browser without a window."""
-    with tempfile.TemporaryDirectory(prefix="softstart-print-", ignore_cleanup_errors=True) as folder:
-        source, target = Path(folder, "report.html"), Path(folder, "report.pdf")
-        source.write_text(page, encoding="utf-8")
-        words = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
-        # a profile of its own: a browser that runs already would take over and print nothing
-        words += [f"--user-data-dir={folder}/profile", f"--print-to-pdf={target}"]
-        if hasattr(os, "geteuid") and os.geteuid() == 0:
-            words.append("--no-sandbox")  # which root cannot have
-        try:
-            command = [*words, source.as_uri()]
-            done = subprocess.run(command, capture_output=True, timeout=PRINTING, check=False)
-            said = " ".join(done.stderr.decode(errors="replace").split()[-20:])
-            why = said or f"exit code {done.returncode}"
-        except (OSError, subprocess.TimeoutExpired) as error:
-            why = str(error)
-        if not target.exists():
-            raise InputError(f"--pdf: {browser} did not print ({why}); print the HTML file of --out instead.")
-        return target.read_bytes()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Hashable
 
 from nicegui import ui
@@ -34,6 +33,7 @@ from softstart.page.panel_parts import (
     save,
     text_field,
 )
+from softstart.page.sentences import in_words
 from softstart.page.session import Session
 from softstart.quantities import RefusedError
 from softstart.views.numbers import cut
@@ -49,6 +49,7 @@ TITLES = {
     "shaft": "Damping",
     "limits": "Permissible torque",
 }
+LABELS = {p.path: p.meaning for p in DataSheet.PARAMETERS.values()}
 
 
 class DataSheetPanel:
@@ -101,7 +102,7 @@ class DataSheetPanel:
             title, sentences = "Check these values.", sheet.plausibility_warnings
         except InputError as error:
             title, sentences = "There is no drive yet.", list(error.sentences)
-        self._troubles.say([*map(in_words, sentences)], title)
+        self._troubles.say([*(in_words(one, LABELS) for one in sentences)], title)
         self._text.set_visibility(sheet is not None)
         self._text.set_text("" if sheet is None else sheet.drive_toml())
         return sheet
@@ -114,20 +115,6 @@ class DataSheetPanel:
     def _save(self) -> None:
         if (sheet := self.sheet()) is not None:
             save(sheet.drive_toml(), drive_file(sheet.drive))
-
-
-def in_words(sentence: str) -> str:
-    """A sentence about a data sheet with the labels of the form in place of keys.
-
-    >>> in_words('[motor] rated_speed = "fast": this is not a number with a unit.')
-    'Rated speed "fast": this is not a number with a unit.'
-    >>> in_words('[gear] ratio is missing: the ratio is needed; write for example ratio = 31.5.')
-    'Turns of the motor for one of the output is missing: the ratio is needed; write for example 31.5.'
-    """
-    labels = {p.path: p.meaning for p in DataSheet.PARAMETERS.values()}
-    text = re.sub(r"\[(\w+)\] (\w+)(?: =)?", lambda m: labels.get(f"{m[1]}.{m[2]}", m[0]), sentence)
-    text = re.sub(r'write for example \w+ = "?([^"]*)"?\.$', r"write for example \1.", text)
-    return text[:1].upper() + text[1:]
 
 
 def data_sheet_field(p: Parameter) -> ui.input | ui.select:

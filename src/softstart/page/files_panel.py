@@ -32,16 +32,19 @@ from softstart.page.panel_parts import (
     hint,
     notify,
     save,
+    text_area,
     text_field,
     upload,
 )
 from softstart.page.project import project_of, take_file, take_text
+from softstart.page.sentences import in_words
 from softstart.page.session import Session
+from softstart.project import Project
 from softstart.project.parts import kind_of, profile_of
 from softstart.views.numbers import cut
 
 LARGEST = 512 * 1024  # bytes of a file
-AS_LOADED = "this machine as loaded"
+AS_LOADED, NO_OTHER = "this machine as loaded", "no other machine"
 
 
 class FilesPanel:
@@ -49,7 +52,7 @@ class FilesPanel:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         parts = {
-            "Project and drive": (DriveFiles, BesidePanel),
+            "Project and drive": (DriveFiles, ProjectNames, BesidePanel),
             "Strategies": (StrategyText,),
             "Export": (Exports, ParameterSheetPanel, ProgramPanel, ReportPanel),
             "Command line": (command_line,),
@@ -107,18 +110,62 @@ class DriveFiles:
         save(machine.to_toml(), drive_file(machine))
 
 
+class ProjectNames:
+    """Names and notes of the project, which its report has in its heading."""
+
+    LABELS: ClassVar[dict[str, str]] = {
+        "customer": "Customer", "project": "Project", "number": "Document number", "author": "Author",
+        "company": "Company", "checked": "Checked by, date", "approved": "Approved by, date",
+        "paper": "Paper", "decimal": "Decimal sign",
+    }  # fmt: skip
+
+    def __init__(self, session: Session, user: Hashable) -> None:
+        self._session = session
+        self._fields: dict[str, ui.input | ui.select | ui.textarea] = {}
+        self._labels = {Project.PARAMETERS[key].path: label for key, label in self.LABELS.items()}
+        self._seen: dict[str, str] = {}
+        with ui.element("details").classes("panel-fold"):
+            ui.html("Names and notes", tag="summary", sanitize=False).props('data-testid="project-names"')
+            with box("panel-form"):
+                for key, label in self.LABELS.items():
+                    p, name = Project.PARAMETERS[key], f"project-{key}"
+                    example = p.example.strip('"')
+                    field = (choice(label, list(p.choices), example, name) if p.choices
+                             else text_field(label, "", name, f"such as {example}"))  # fmt: skip
+                    self._fields[key] = field
+                self._fields["notes"] = text_area("Notes", "", "project-notes")
+            hint("The report has them in its heading; notes stay in the project.")
+        for key, field in self._fields.items():
+            field.on_value_change(partial(self._take, key))
+        self._troubles = Troubles("project")
+        follow(session, self._refresh)
+
+    def _refresh(self) -> None:
+        """Show what the project has, where that is new: what is being typed stays."""
+        for key, field in self._fields.items():
+            if (text := getattr(self._session.inputs.project, key)) != self._seen.get(key):
+                self._seen[key] = text
+                field.set_value(text)
+
+    def _take(self, key: str) -> None:
+        try:
+            self._session.describe(key, str(self._fields[key].value or ""))
+            self._seen[key] = getattr(self._session.inputs.project, key)
+            self._troubles.say(())
+        except InputError as error:
+            self._troubles.say([in_words(one, self._labels) for one in error.sentences])
+
+
 class StrategyText:
     """A torque profile or the file of a strategy as text, pasted: it joins the strategies at once."""
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        self._name = text_field("Name", "mine", "paste-name")
         example = "time [s] and torque [N m], as copied from a spreadsheet, or the text of a strategy file"
-        self._text = ui.textarea(placeholder=example).props(
-            'dense outlined aria-label="Torque profile" data-testid="paste-text"'
-        )
-        self._text.classes("panel-wide")
-        action("Add to the strategies", self._add, "paste-add")
+        with box("panel-form"):
+            self._name = text_field("Name", "mine", "paste-name")
+            self._text = text_area("Torque profile", example, "paste-text")
+            action("Add to the strategies", self._add, "paste-add")
         hint("A line for each instant, straight in between; the start under it is in the table at once.")
         self._troubles = Troubles("paste")
 
@@ -134,6 +181,32 @@ class StrategyText:
             self._troubles.say(sentences, f"{cut(label)} was not added; the strategies are unchanged.")
 
 
+class OtherMachine:
+    """The choice of a machine beside the present one: as loaded, of the project, or shipped, of its kind."""
+
+    def __init__(self, session: Session, name: str, first: str) -> None:
+        self._session, self._first = session, first
+        self.choice = choice("Beside it", [first], first, name)
+        follow(session, self._offer)
+
+    def _offer(self) -> None:
+        inputs = self._session.inputs
+        own = [one.name for one in inputs.project.machines if one.name != inputs.project.machine]
+        names = [name for name, one in shipped_drives().items() if type(one) is type(inputs.machine)]
+        if (options := [*dict.fromkeys([self._first, AS_LOADED]), *own, *names]) != self.choice.options:
+            self.choice.set_options(options, value=inputs.project.beside or self._first)
+
+    @property
+    def machine(self) -> Loaded | None:
+        """The machine; None if none is chosen."""
+        inputs, name = self._session.inputs, str(self.choice.value)
+        if name == AS_LOADED:
+            return inputs.origin
+        if name in [one.name for one in inputs.project.machines]:
+            return inputs.project.loaded(name)
+        return shipped_drives().get(name)
+
+
 class BesidePanel(JobPanel):
     """The present machine and another one under the strategies of the table, in one table and figure."""
 
@@ -147,27 +220,12 @@ class BesidePanel(JobPanel):
     def form(self) -> None:
         """The other machine."""
         ui.label("Two machines side by side").classes("panel-caption")
-        self._other = choice("Beside it", [AS_LOADED], AS_LOADED, "beside-machine")
-        follow(self.session, self._offer)
-
-    def _offer(self) -> None:
-        """The machines of the present project, and the shipped ones of this kind."""
-        inputs = self.session.inputs
-        own = [one.name for one in inputs.project.machines if one.name != inputs.project.machine]
-        names = [name for name, one in shipped_drives().items() if type(one) is type(inputs.machine)]
-        if (options := [AS_LOADED, *own, *names]) != self._other.options:
-            self._other.set_options(options, value=inputs.project.beside or AS_LOADED)
+        self._other = OtherMachine(self.session, "beside-machine", AS_LOADED)
 
     def task(self) -> Task:
         """Both comparisons."""
-        inputs, name = self.session.inputs, str(self._other.value)
-        if name == AS_LOADED:
-            other: Loaded = inputs.origin
-        elif name in [one.name for one in inputs.project.machines]:
-            other = inputs.project.loaded(name)
-        else:
-            other = shipped_drives()[name]
-        return tasks.beside_task, inputs.both_ends, other, list(inputs.controllers.values())
+        inputs = self.session.inputs
+        return tasks.beside_task, inputs.both_ends, self._other.machine, list(inputs.controllers.values())
 
     def estimate(self) -> float:
         """Two comparisons."""
@@ -277,22 +335,35 @@ class ReportPanel(JobPanel):
 
     name = "report"
     about = (
-        "The report is one file that opens offline and prints: drive, strategies, limit, robustness, "
-        "parameter sheet."
+        "One file that opens offline and prints: recommendation, strategies, lower bound and optimum, "
+        "robustness, parameter sheets. Customer and project are those of Names and notes, above."
     )
-    verb = "Report HTML"
+    verb = "Report"
     saves = True
+    KINDS: ClassVar[dict[str, str]] = {".html": "HTML", ".pdf": "PDF"}
 
     def form(self) -> None:
-        """The caption."""
+        """The kind of the file, and another machine."""
         ui.label("Report for a customer").classes("panel-caption")
+        self._kind = choice("File", self.KINDS, ".html", "report-kind")
+        self._other = OtherMachine(self.session, "report-beside", NO_OTHER)
 
     def task(self) -> Task:
         """The report."""
-        inputs = self.session.inputs
-        name = file_name(inputs.machine.name, "report", suffix=".html")
-        command = command_text(inputs.machine_with_duty, inputs.controllers, "report", f"--out={name}")
-        return tasks.report_task, inputs.both_ends_with_duty, list(inputs.controllers.values()), command, name
+        inputs, suffix = self.session.inputs, str(self._kind.value)
+        name = file_name(inputs.machine.name, "report", suffix=suffix)
+        option = {".html": "--out", ".pdf": "--pdf"}[suffix]
+        command = command_text(inputs.machine_with_duty, inputs.controllers, "report", f"{option}={name}")
+        strategies, beside = list(inputs.controllers.values()), self._other.machine
+        return (
+            tasks.report_task,
+            inputs.both_ends_with_duty,
+            strategies,
+            command,
+            name,
+            inputs.project,
+            beside,
+        )
 
     def estimate(self) -> float:
         """Mostly its budget for maps and limits."""

@@ -15,7 +15,7 @@ from softstart.errors import InputError
 from softstart.page.jobs import Job, Jobs, JobState
 from softstart.page.panel_parts import POLL, Troubles, action, box, copying, hint, notify, reveal, save
 from softstart.page.sentences import changed_since
-from softstart.page.session import Session
+from softstart.page.session import ClaimedOptimum, Session
 from softstart.views.numbers import cut
 
 if TYPE_CHECKING:
@@ -237,7 +237,9 @@ class JobPanel(ABC):
         now, computed = self.session.inputs.machine, self.job.machine
         if computed.name != now.name and (sentence := changed_since(computed, now)):
             raise InputError(f"{sentence[:-1]}: it is not added to the strategies.")
-        label = self.session.add(label, self._result.controllers[label], select=False)
+        claims = self._result.optima.get(label)
+        optimum = None if claims is None else ClaimedOptimum(computed, claims)
+        label = self.session.add(label, self._result.controllers[label], select=False, optimum=optimum)
         notify(f"{label} was added to the strategies.")
 
     def _use(self) -> None:

@@ -37,7 +37,7 @@ TERMINALS = {
     "steady": "both, and shaft torque at rest",
 }
 MEDIA = {".csv": "text/csv", ".toml": "application/toml", ".c": "text/x-csrc", ".html": "text/html",
-         ".zip": "application/zip"}  # fmt: skip
+         ".zip": "application/zip", ".pdf": "application/pdf"}  # fmt: skip
 
 
 def box(classes: str) -> Element:
@@ -51,6 +51,15 @@ def text_field(label: str, value: str, name: str, example: str = "") -> ui.input
         ui.label(label)
         field = ui.input(value=value).props(f'dense outlined aria-label="{label}" data-testid="{name}"')
         return field.tooltip(example) if example else field
+
+
+def text_area(label: str, example: str, name: str) -> ui.textarea:
+    """A field for several lines, as wide as the panel, below its label."""
+    with box("panel-field panel-wide"):
+        ui.label(label)
+        return ui.textarea(placeholder=example).props(
+            f'dense outlined autogrow aria-label="{label}" data-testid="{name}"'
+        )
 
 
 def row_of(field: Element) -> Element:

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 from softstart.chain.machines import known_from
 from softstart.drive import Duty
+from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.page.duty import DutyPlan
 from softstart.page.machines import Loaded
+from softstart.page.sentences import WORDS, changes
 from softstart.project import Project
 from softstart.project.parts import (
     StoredMachine,
@@ -46,20 +48,49 @@ def project_of(session: Session) -> Project:
     project, machine = inputs.project, inputs.machine_with_duty
     name = project.machine or machine.name
     own = [label for label in inputs.controllers if label in (*session.added, *session.changed)]
-    optima = [one.name for one in project.optima]
     given = {key: value for key, value in project.given().items() if key != "duty"}  # the machine has it now
-    others = [one for one in project.machines if one.name != name]
+    bare, others = Project(**given), [one for one in project.machines if one.name != name]
+    files = {name: machine.to_toml()} | {one.name: one.file for one in others}
+    machines = {name: machine} | {one.name: bare.single(one.name) for one in others}
+
+    def place_of(computed: Machine, label: str) -> str:
+        """The name of the machine of an optimum, which is stored too where it has changed since."""
+        same = (other for other, one in machines.items() if starts_alike(one, computed))
+        if (place := next(same, "")) == "":
+            place = f"{computed.name} for {label}"
+            files[place], machines[place] = computed.to_toml(), computed
+        return place
+
+    optima = {}
+    for one in project.optima:
+        places = [place_of(bare.single(place), one.name) for place in one.machines]
+        optima[one.name] = one.on(places)
+    for label, (computed, claims) in inputs.optima.items():
+        optima[label] = claims.on([place_of(computed, label)]).replace(name=label)
     return Project(
         **given | {
             "machine": name, "strategy": inputs.selected,
-            "machines": [StoredMachine(name=name, file=machine.to_toml()), *others],
+            "machines": [StoredMachine(name=place, file=file) for place, file in files.items()],
             "strategies": [
                 *(one for one in project.strategies if one.name not in own),
                 *(StoredStrategy(name=label, file=file_of(inputs.controllers[label]))
                   for label in own if label not in optima),
             ],
+            "optima": optima.values(),
         }
     )  # fmt: skip
+
+
+def starts_alike(machine: Machine, other: Machine) -> bool:
+    """Whether an optimum of one is an optimum of the other: names, units and limits change no start.
+
+    >>> from softstart import Drive
+    >>> crane = Drive.load("crane-4amtkf")
+    >>> starts_alike(crane, crane.replace(shaft_torque=80.0)), starts_alike(crane, crane.replace(gap=1.0))
+    (True, False)
+    """
+    changed = [one for one in changes(machine, other) if one.parameter.name not in WORDS]
+    return type(machine) is type(other) and all(one.path.startswith("limits.") for one in changed)
 
 
 def take_file(session: Session, content: bytes, name: str) -> str:

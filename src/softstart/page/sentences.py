@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import re
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from softstart.drive.machine import Machine
@@ -52,6 +54,24 @@ def page_sentence(sentence: str) -> str:
     'The position is unknown. Choose it.'
     """
     return sentence.on_page if isinstance(sentence, Sentence) else sentence
+
+
+def in_words(sentence: str, labels: Mapping[str, str]) -> str:
+    """A sentence with the labels of fields, by path, in place of keys.
+
+    >>> labels = {"motor.rated_speed": "rated speed", "gear.ratio": "turns of the motor"}
+    >>> in_words('[motor] rated_speed = "fast": this is not a number with a unit.', labels)
+    'Rated speed "fast": this is not a number with a unit.'
+    >>> in_words('gear.ratio is missing: it is needed; write for example ratio = 31.5.', labels)
+    'Turns of the motor is missing: it is needed; write for example 31.5.'
+    """
+
+    def label(found: re.Match[str]) -> str:
+        return labels.get(found[3] or f"{found[1]}.{found[2]}", found[0])
+
+    text = re.sub(r"(?:\[(\w+)\] (\w+)|((?:\w+(?:\[\d+\])?\.)+\w+))(?: =)?", label, sentence)
+    text = re.sub(r'write for example [\w.]+ = "?([^"]*)"?\.$', r"write for example \1.", text)
+    return text[:1].upper() + text[1:]
 
 
 def changed_since(computed: Machine, now: Machine) -> str:

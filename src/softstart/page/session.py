@@ -24,7 +24,7 @@ from softstart.hints import nearest
 from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, sentence_of
-from softstart.project import Project
+from softstart.project import Project, StoredOptimum
 from softstart.quantities import Units
 from softstart.start.comparison import (
     REFERENCE,
@@ -109,6 +109,13 @@ class DutyResult:
     given_up: bool = False  # it takes too long
 
 
+class ClaimedOptimum(NamedTuple):
+    """What an optimum claims, and the machine on which it holds; it is checked on that again."""
+
+    machine: Machine
+    stored: StoredOptimum
+
+
 class EqualTime(NamedTuple):
     """A strategy set for a given time: its row, or a word and the sentence that say why there is none."""
 
@@ -139,7 +146,8 @@ class Inputs:
     soft_end: Mapping[str, float] = field(default_factory=dict)  # of a drive loaded without stiffness: SOFT
     at_time: str = ""  # within which the strategies of the table are set to settle, "1.3x"; "" as they are
     duty: DutyPlan | None = None  # of the machine, without its own: start, hold, stop
-    project: Project = NO_PROJECT  # what it has beside that: names, notes, other machines, claims of optima
+    project: Project = NO_PROJECT  # what it has beside that: names, notes, other machines, earlier optima
+    optima: Mapping[str, ClaimedOptimum] = field(default_factory=dict)  # that were computed here, by label
 
     @cached_property
     def units(self) -> Units:
@@ -400,6 +408,7 @@ class Session:
             soft_end=soft_end,
             duty=duty,
             project=project,
+            optima={},
         )
         self._offered = self.inputs.selected
 
@@ -419,7 +428,21 @@ class Session:
         self._change(
             machine=stiff, origin=stiff, controllers=controllers, selected=selected,
             visible=frozenset((selected, *own)), soft_end=soft_end, duty=duty, project=project,
+            optima={},
         )  # fmt: skip
+
+    def describe(self, key: str, text: str) -> None:
+        """Another name in the heading of the project, as `customer`, or other notes.
+
+        >>> session = Session()
+        >>> session.describe("customer", "Harbour Cranes Ltd")
+        >>> session.inputs.project.customer
+        'Harbour Cranes Ltd'
+        """
+        project, text = self.inputs.project, text.strip()
+        if text != getattr(project, key).strip():
+            others = {name: value for name, value in project.given().items() if name != key}
+            self._change(f"describe {key}", project=Project(**others | ({key: text} if text else {})))
 
     def restore(self, inputs: Inputs) -> None:
         """Begin with earlier inputs, or with those of somebody else; nothing can be undone then."""
@@ -438,8 +461,15 @@ class Session:
             self._past.append(self.inputs)
             self._go_to(self._future.pop())
 
-    def add(self, label: str, controller: Controller, *, select: bool = True) -> str:
-        """Add a controller (tuned gains, the profile of an optimum) to the strategies.
+    def add(
+        self,
+        label: str,
+        controller: Controller,
+        *,
+        select: bool = True,
+        optimum: ClaimedOptimum | None = None,
+    ) -> str:
+        """Add a controller (tuned gains, the profile of an `optimum` with its claims) to the strategies.
 
         A label that exists already is replaced. Returns the label in the table.
         """
@@ -453,6 +483,8 @@ class Session:
             controllers={**inputs.controllers, label: controller},
             visible=inputs.visible | {label},
             selected=label if select else inputs.selected,
+            project=inputs.project.without(label),
+            optima=_without(inputs.optima, label) | ({} if optimum is None else {label: optimum}),
         )
         return label
 
@@ -460,12 +492,15 @@ class Session:
         """Take a strategy out of the table; the last one stays."""
         self._check_label(label)
         inputs = self.inputs
-        others = {name: controller for name, controller in inputs.controllers.items() if name != label}
+        others = _without(inputs.controllers, label)
         if not others:
             raise InputError(f'strategy "{label}": this is the last strategy; add another one first.')
         selected = next(iter(others)) if inputs.selected == label else inputs.selected
         project = inputs.project.without(label)
-        self._change(controllers=others, visible=inputs.visible - {label}, selected=selected, project=project)
+        self._change(
+            controllers=others, visible=inputs.visible - {label}, selected=selected, project=project,
+            optima=_without(inputs.optima, label),
+        )  # fmt: skip
 
     def select(self, label: str) -> None:
         """Make a strategy the one with the large figure; it is drawn from then on."""
@@ -732,6 +767,10 @@ def _both_ends(machine: Loaded) -> tuple[Machine, dict[str, float]]:
     """The machine to begin with, and what differs at the soft end of an unknown stiffness."""
     stiff, _, soft = as_far_as_known(machine)
     return startable(stiff), {} if soft is None else {name: getattr(soft, name) for name in SOFT}
+
+
+def _without(things: Mapping[str, Any], label: str) -> dict[str, Any]:
+    return {name: thing for name, thing in things.items() if name != label}
 
 
 def _without_settled(inputs: Inputs) -> Inputs:

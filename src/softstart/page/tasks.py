@@ -26,7 +26,7 @@ from softstart.page.downloads import file_name, profile_file, written_text
 from softstart.page.machines import Loaded, with_typed_changes
 from softstart.page.sentences import page_sentence
 from softstart.parallel import Progress
-from softstart.project.parts import player_of
+from softstart.project.parts import StoredOptimum, player_of
 from softstart.quantities import show
 from softstart.start.comparison import compare
 from softstart.start.fatigue import fatigue
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from softstart.identification.logs import TorqueIs
     from softstart.optimal.problem import Terminal
     from softstart.optimal.result import Optimum
+    from softstart.project import Project
     from softstart.views.sheet import Sheet
 
 TUNING_SHARES = {"starts": (0.0, 0.05), "schedule": (0.05, 0.45), "robust": (0.45, 0.8), "optima": (0.8, 1.0)}
@@ -48,13 +49,14 @@ INTERVAL = 0.1  # s between two reports of a task that would report thousands of
 class TaskResult:
     """The result of a task: HTML to show, contents of files by name, and what may be taken over from it.
 
-    `controllers` may join the strategies, by label; `drive` may become that of the page; `copy` is what a
-    button puts into the clipboard.
+    `controllers` may join the strategies, by label, with what they claim as `optima`; `drive` may become that
+    of the page; `copy` is what a button puts into the clipboard.
     """
 
     html: str
     files: Mapping[str, str | bytes] = field(default_factory=dict)
     controllers: Mapping[str, Controller] = field(default_factory=dict)
+    optima: Mapping[str, StoredOptimum] = field(default_factory=dict)
     drive: Machine | None = None
     copy: str = ""
 
@@ -84,12 +86,16 @@ def optimum_task(drive: Machine, start_time: str, terminal: Terminal, *, progres
     for name in ready_controller_names():
         with suppress(InputError, SimulationError):
             others.append(simulate(drive, name))
-    label = optimum_label(best)
-    player = player_of(best.profile, label)
+    return with_optimum(best, optimum_label(best), optimum_sheet(best, others))
+
+
+def with_optimum(best: Optimum, label: str, *sheets: Sheet) -> TaskResult:
+    """These sheets, the profile as files, and the optimum as a strategy with its claims."""
     return TaskResult(
-        shown(optimum_sheet(best, others)),
+        shown(*sheets),
         profile_files(best, label),
-        {label: player},
+        {label: player_of(best.profile, label)},
+        {label: StoredOptimum.of(best, label, best.problem.drive.name)},
     )
 
 
@@ -288,9 +294,7 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
         notes = error.sentences if isinstance(error, InputError) else [str(error)]
         return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=notes)))
     label = f"quickest {best.end_time:.4g} s"
-    player = player_of(best.profile, label)
-    quickest = optimum_sheet(best, [row.run for row in compared.rows])
-    return TaskResult(shown(*sheets, quickest), profile_files(best, label), {label: player})
+    return with_optimum(best, label, *sheets, optimum_sheet(best, [row.run for row in compared.rows]))
 
 
 def sheet_task(drive: Loaded, controller: Controller, file: str, *, progress: Progress) -> TaskResult:
@@ -303,17 +307,28 @@ def sheet_task(drive: Loaded, controller: Controller, file: str, *, progress: Pr
 
 
 def report_task(
-    drive: Loaded, controllers: Sequence[str | Controller], command: str, file: str, *, progress: Progress
+    drive: Loaded,
+    controllers: Sequence[str | Controller],
+    command: str,
+    file: str,
+    project: Project,
+    beside: Loaded | None,
+    *,
+    progress: Progress,
 ) -> TaskResult:
-    """The report for a customer, as one HTML file; SOFTSTART_BUDGET, in s, is its `budget`."""
+    """The report for a customer, one HTML or PDF file; SOFTSTART_BUDGET, in s, is its `budget`."""
     from softstart import reporting
+    from softstart.reporting.printing import browser_that_prints, printed
 
+    browser = browser_that_prints() if file.endswith(".pdf") else ""
     progress(0.0, "starting the drive")
     budget = float(text) if (text := os.environ.get("SOFTSTART_BUDGET")) else None
     report = reporting.report(
-        drive, controllers=controllers, progress=progress, command=command, budget=budget or None
-    )
-    return TaskResult("", {file: report.to_html()})
+        drive, controllers=controllers, progress=progress, command=command, budget=budget or None,
+        project=project, beside=beside,
+    )  # fmt: skip
+    page = report.to_html()
+    return TaskResult("", {file: printed(page, browser) if browser else page})
 
 
 def program_task(

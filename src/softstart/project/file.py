@@ -258,8 +258,8 @@ class Project(ParameterFile):
         if self.duty and self.duty not in duties:
             yield f'[choice] duty = "{self.duty}": the project has no such duty; {_meant(self.duty, duties)}'
         named = {"[choice] machine": self.machine, "[choice] beside": self.beside}
-        named |= {f'optimum "{one.name}", machine': one.machine for one in self.optima}
-        for key, name in named.items():
+        of_optima = [(f'optimum "{one.name}", machine', name) for one in self.optima for name in one.machines]
+        for key, name in (*named.items(), *of_optima):
             if name and name not in machines:
                 yield f'{key} = "{name}": the project has no such machine; {_meant(name, machines)}'
         if self.strategy and self.strategy not in (known := self.strategy_names):

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_of, make_controller, named
@@ -12,7 +13,7 @@ from softstart.controller.tuned import ScheduleFile, read_gains, strategy_text
 from softstart.drive import Duty, Machine
 from softstart.errors import InputError
 from softstart.input.documents import parsed
-from softstart.input.parameter_set import MaybeNumber, Number, ParameterSet, parameter
+from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, ParameterSet, parameter
 from softstart.input.parameters import REQUIRED, Wording
 from softstart.profile import TorqueProfile
 
@@ -113,24 +114,53 @@ class StoredOptimum(ParameterSet):
     bound_kind: str = _text("optimum.bound_kind", "how the bound is proved", '"momentum"', "none",
         choices=("duality", "momentum", "none"))
     bound_covers: str = _text("optimum.bound_covers", "starts for which it is proved", '"every torque"', "")
+    others: str = _text("optimum.others", "names of other machines that its torque serves, one a line",
+        '"crane worn"', "")
+    base: str = _text("optimum.base", "machine to whose mean torque K_dyn refers, if another",
+        '"crane"', "")
+    curve_speed: MaybeSeries = parameter("optimum.curve_speed", "rad/s", "speeds of a torque-speed curve",
+        "[0.0, 60.0, 100.0]", default=None, many=True)
+    curve_torque: MaybeSeries = parameter("optimum.curve_torque", "N*m", "torques that it allows there",
+        "[62.0, 62.0, 22.0]", default=None, many=True)
     file: str = _file("optimum")
     # fmt: on
 
     @classmethod
-    def of(cls, best: Optimum, name: str, machine: str) -> StoredOptimum:
-        """An optimum of this machine of the project; InputError for one that serves several machines."""
+    def of(
+        cls, best: Optimum, name: str, machine: str, others: Sequence[str] = (), base: str = ""
+    ) -> StoredOptimum:
+        """An optimum of this machine of the project; `others` are the names of its further machines there."""
         problem = best.problem
-        if problem.scenarios or problem.base or problem.torque_speed:
+        if (len(others), bool(base)) != (len(problem.scenarios), problem.base is not None):
+            further = f"{len(problem.scenarios)} further machines{' and a base' if problem.base else ''}"
             raise InputError(
-                f'optimum "{name}": it serves several machines or keeps a torque-speed curve, which a '
-                "project does not hold; save its profile as a strategy."
+                f'optimum "{name}": it was computed with {further}; name these of the project (others, base).'
             )
+        speeds, torques = zip(*problem.torque_speed, strict=True) if problem.torque_speed else (None, None)
         return cls(
             name=name, machine=machine, end_time=best.end_time, claimed=best.minimised,
             minimise=problem.minimise, terminal=problem.terminal, start_time=problem.start_time,
             k_dyn=problem.k_dyn, heat=problem.heat, bound=best.bound.k_dyn, bound_kind=best.bound.kind,
-            bound_covers=best.bound.covers, file=best.profile.toml_text(),
+            bound_covers=best.bound.covers, others="\n".join(others), base=base, curve_speed=speeds,
+            curve_torque=torques, file=best.profile.toml_text(),
         )  # fmt: skip
+
+    def contradictions(self) -> Iterator[str]:
+        """A sentence on a curve of which speeds and torques do not belong together."""
+        speeds, torques = self.curve_speed or (), self.curve_torque or ()
+        if len(speeds) != len(torques):
+            yield f"curve_speed has {len(speeds)} values, curve_torque {len(torques)}; give as many of each."
+
+    @property
+    def machines(self) -> tuple[str, ...]:
+        """The names of all its machines: its own, the others, and the base if there is one."""
+        return (self.machine, *self.others.splitlines(), *([self.base] if self.base else []))
+
+    def on(self, machines: Sequence[str]) -> Self:
+        """The same optimum, its machines called by these names."""
+        own, *others = machines
+        base = others.pop() if self.base else ""
+        return self.replace(machine=own, others="\n".join(others), base=base)
 
     @property
     def profile(self) -> TorqueProfile:
@@ -142,16 +172,18 @@ class StoredOptimum(ParameterSet):
         """What plays it."""
         return player_of(self.profile, self.name)
 
-    def checked(self, machine: Machine) -> tuple[Run, ...]:
-        """Its starts on the exact machine; OptimumError where a claim or a bound does not hold there."""
+    def checked(self, machine: Machine, *others: Machine) -> tuple[Run, ...]:
+        """Its starts on the exact `machines`; OptimumError where a claim or a bound does not hold there."""
         from softstart.optimal.check import check, replayed
         from softstart.optimal.problem import Problem
         from softstart.optimal.result import LowerBound
 
         choices: Any = {"minimise": self.minimise}
         problem = Problem(
-            machine, self.start_time, self.terminal, k_dyn=self.k_dyn, heat=self.heat, **choices
-        )
+            machine, self.start_time, self.terminal, k_dyn=self.k_dyn, heat=self.heat,
+            torque_speed=tuple(zip(self.curve_speed or (), self.curve_torque or (), strict=True)),
+            scenarios=others[:-1] if self.base else others, base=others[-1] if self.base else None, **choices,
+        )  # fmt: skip
         kind: Any = self.bound_kind
         runs = replayed(problem, self.profile, self.end_time)
         bound = LowerBound(self.bound, kind, self.bound_covers)

@@ -146,7 +146,7 @@ def test_without_a_browser_no_pdf(monkeypatch, refused):
     for browser, says in (
         (None, "apt-get install chromium"),
         ("no-such-browser", 'SOFTSTART_CHROMIUM = "no-such-browser": there is no such program'),
-        ("/bin/false", "--pdf: /bin/false did not print (exit code 1); print the HTML file of --out"),
+        ("/bin/false", "PDF: /bin/false did not print (exit code 1). Print the HTML file of --out"),
     ):
         monkeypatch.delenv("SOFTSTART_CHROMIUM", raising=False)
         if browser:

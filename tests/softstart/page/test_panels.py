@@ -256,13 +256,13 @@ def test_a_machine_beside_this_one_is_that_as_loaded_of_the_project_or_shipped(c
     session.set("gap", 1.0)
     with client:
         panel = BesidePanel(session, "A", Queue())
-        assert panel._other.options[:2] == [AS_LOADED, "worn"]
+        assert panel._other.choice.options[:2] == [AS_LOADED, "worn"]
         for name, other in (
             ("worn", worn),
             (AS_LOADED, session.inputs.origin),
             ("hoist-15kw", Drive.load("hoist-15kw")),
         ):
-            panel._other.set_value(name)
+            panel._other.choice.set_value(name)
             function, first, second, controllers = panel.task()
             assert (first.gap, second) == (1.0, other)
     result = function(first, second, controllers, progress=lambda share, what: None)

@@ -12,7 +12,7 @@ from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.page.downloads import profile_file
 from softstart.page.project import project_of, take_file, take_text
-from softstart.page.session import Session
+from softstart.page.session import ClaimedOptimum, Session
 from softstart.project import Project, StoredOptimum
 from softstart.project.parts import file_of, player_of
 
@@ -132,3 +132,54 @@ def test_an_optimum_keeps_its_claims_on_the_page() -> None:
     assert session.result("best").k_dyn == best.k_dyn
     assert project_of(session).optima == (stored,)
     assert project_of(session).strategies == ()
+
+
+def test_an_optimum_of_the_page_is_saved_with_its_claims_on_the_machine_as_it_was() -> None:
+    fast = CRANE.replace(target_speed=60.0, name="fast")
+    best = optimize(fast, 0.2883042)
+    session = Session(fast, ["direct"])
+    claimed = ClaimedOptimum(fast, StoredOptimum.of(best, "best", "fast"))
+    session.add("own label", player_of(best.profile, "best"), optimum=claimed)
+    session.set("limits.shaft_torque", "150 N*m")  # bounds no start
+
+    def names_and_k_dyn(project: Project) -> tuple[list[str], str, float]:
+        (one,) = project.optima
+        (run,) = one.checked(*map(project.single, one.machines))
+        assert (one.name, one.start_time, one.bound) == ("own label", 0.2883042, best.bound.k_dyn)
+        return [machine.name for machine in project.machines], one.machine, run.k_dyn
+
+    assert names_and_k_dyn(project_of(session)) == (["fast"], "fast", best.k_dyn)
+    session.set("shaft.gap", 0.7)
+    other = "fast for own label"
+    saved = Project.read(project_of(session).to_toml())
+    assert names_and_k_dyn(saved) == (["fast", other], other, best.k_dyn)
+    assert saved.single().gap == 0.7
+    again = Session(saved, ["direct"])
+    again.set("shaft.gap", 0.9)
+    assert names_and_k_dyn(project_of(again)) == (["fast", other], other, best.k_dyn)
+    again.set("shaft.gap", fast.gap)
+    assert names_and_k_dyn(project_of(again))[1] == "fast"
+    again.load(CRANE)  # the project keeps the optimum and its machine
+    assert names_and_k_dyn(project_of(again))[2] == best.k_dyn
+    again.undo()
+    again.add("own label", player_of(PROFILE, "own label"))  # another start takes its name
+    assert project_of(again).optima == ()
+    session.remove("own label")
+    assert project_of(session).optima == ()
+
+
+def test_names_and_notes_are_edited_and_undone() -> None:
+    session = Session(controllers=["direct"])
+    session.describe("customer", " Harbour & Co ")
+    session.describe("notes", "gap measured\non site")
+    before = session.inputs
+    session.describe("customer", "Harbour & Co")
+    assert session.inputs is before
+    project = Project.read(project_of(session).to_toml())
+    assert (project.customer, project.notes) == ("Harbour & Co", "gap measured\non site")
+    with pytest.raises(InputError, match="one line"):
+        session.describe("author", "two\nlines")
+    session.describe("customer", "")
+    assert project_of(session).customer == ""
+    session.undo()
+    assert project_of(session).customer == "Harbour & Co"

@@ -35,6 +35,7 @@ from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
 from softstart.page.panels import grid_of, tunable_controllers
 from softstart.page.sentences import changed_since, page_sentence
+from softstart.project import Project
 
 CRANE = Drive.load("crane-4amtkf")
 
@@ -205,3 +206,22 @@ def test_drift_names_what_was_and_what_is_another_drive() -> None:
     )
     other = Drive.load("servo-axis-small")
     assert changed_since(CRANE, other) == f"For {CRANE.name}; another drive is loaded now."
+
+
+def test_the_report_has_customer_and_another_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SOFTSTART_BUDGET", "0.001")
+    project, other = (
+        Project(customer="Harbour & Co", decimal="comma"),
+        CRANE.replace(name="the worn one", gap=1.0),
+    )
+    ramp = make_controller("ramp")
+    found, _, _ = done(tasks.report_task, CRANE, [ramp], "softstart report", "r.html", project, other)
+    page = str(found.files["r.html"])
+    assert "Harbour &amp; Co" in page
+    assert "B is the worn one" in page
+    assert f"{simulate(other, ramp).k_dyn:.3f}".replace(".", ",") in page
+    monkeypatch.setenv("SOFTSTART_CHROMIUM", "no-such-browser")
+    with pytest.raises(InputError) as refused:
+        done(tasks.report_task, CRANE, [ramp], "softstart report", "r.pdf", project, None)
+    (sentence,) = refused.value.sentences
+    assert page_sentence(sentence).endswith("Save the report as HTML, and print that file in your browser.")

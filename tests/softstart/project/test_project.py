@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,12 @@ from tests.softstart.variants import machines, variants
 from softstart import Chain, Drive, Duty, InputError, OptimumError, TorqueProfile, optimize, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import GainSchedule, RobustGains
+from softstart.optimal.check import replayed
+from softstart.optimal.problem import Problem
+from softstart.optimal.result import LowerBound
 from softstart.project import Project, StoredOptimum
 from softstart.project.file import FIRST, LAST
-from softstart.project.parts import player_of
+from softstart.project.parts import StoredMachine, player_of
 
 CRANE = Drive.load("crane-4amtkf")
 FAST = CRANE.replace(target_speed=60.0)
@@ -131,6 +135,41 @@ def test_an_optimum_is_checked_on_the_machine() -> None:
             stored.replace(**wrong).checked(project.single())
     with pytest.raises(OptimumError):  # on another machine it does not hold
         stored.checked(FAST.replace(gap=1.0))
+
+
+def test_an_optimum_of_several_machines_and_of_a_curve_is_checked_on_all_of_them() -> None:
+    worn, profile = FAST.replace(gap=0.75), TorqueProfile([0.0], [62.0])
+    curve = ((0.0, 62.0), (200.0, 62.0), (300.0, 10.0))
+    problem = Problem(FAST, 0.5, "reached", scenarios=(worn,), base=CRANE, torque_speed=curve)
+    runs = replayed(problem, profile, 0.4)
+    k_dyn = max(run.peak_torque for run in runs) / problem.base_torque
+    best: Any = SimpleNamespace(
+        problem=problem,
+        profile=profile,
+        end_time=0.4,
+        minimised=k_dyn,
+        bound=LowerBound(0.9, "momentum", "all"),
+    )
+    with pytest.raises(InputError, match="1 further machines and a base"):
+        StoredOptimum.of(best, "both", "new")
+    stored = StoredOptimum.of(best, "both", "new", ["worn"], "own")
+    project = Project(
+        machines=[StoredMachine(name=name, file=machine.to_toml())
+                  for name, machine in (("new", FAST), ("worn", worn), ("own", CRANE))],
+        machine="new", optima=[stored],
+    )  # fmt: skip
+    (again,) = moved(project).optima
+    assert again.machines == ("new", "worn", "own")
+    assert again.curve_torque == (62.0, 62.0, 10.0)
+    assert [run.k_dyn for run in again.checked(FAST, worn, CRANE)] == [run.k_dyn for run in runs]
+    with pytest.raises(OptimumError, match="re-simulation"):
+        again.checked(FAST, FAST.replace(gap=2.0), CRANE)
+    with pytest.raises(OptimumError, match="torque-speed"):
+        again.replace(curve_torque=(40.0, 30.0, 10.0)).checked(FAST, worn, CRANE)
+    with pytest.raises(InputError, match="the project has no such machine"):
+        project.replace(optima=[stored.on(["new", "gone", "own"])])
+    with pytest.raises(InputError, match="as many of each"):
+        stored.replace(curve_torque=(62.0,))
 
 
 def test_a_truncated_file_is_refused_and_a_file_is_never_half_written(tmp_path: Path) -> None:
