@@ -55,7 +55,7 @@ QUICK = {
     "balance": "balance",
     "report": "report --json --budget 0 --controllers direct,ramp",
     "sheet": f"sheet {CRANE} --controller ramp",
-    "project": "project open nowhere.toml",
+    "project": "project show nowhere.toml",
     "serve": "serve nowhere.toml --no-browser",
     "init": "init --set load.machine=rotor --set motor.rated_speed=1430rpm --set load.inertia=1",
     "identify": f"identify nowhere.csv --drive {CRANE}",

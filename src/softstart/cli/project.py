@@ -13,15 +13,19 @@ from softstart.cli import options
 from softstart.cli.options import command, option
 from softstart.cli.report import written_report
 from softstart.cli.running import Output, answers, attributed, working
+from softstart.cli.serve import serve_page
 from softstart.errors import InputError
+from softstart.page.address import Address
 
 if TYPE_CHECKING:
     from softstart.project import Project
     from softstart.reporting import Report
 
+ACTIONS = ("new", "open", "show", "report")
+
 
 @command("project")
-@click.argument("action", metavar="new|open|report", type=click.Choice(["new", "open", "report"]))
+@click.argument("action", metavar="|".join(ACTIONS), type=click.Choice(ACTIONS))
 @click.argument("file")
 @click.argument("parts", nargs=-1)
 @option("--check", is_flag=True)
@@ -38,13 +42,14 @@ def project_command(
 
     "new" makes FILE from PARTS: machines (files or shipped names), tuned gains (robust.toml, schedule.toml),
     torque profiles (CSV, TOML) and duties, each called by its file's name; the first machine is chosen.
-    "open" shows what is in FILE. "report" writes the report of the machine and the strategy that are chosen.
-    Names, notes and the choice are edited in the file, which is TOML (see docs/howto/keep-a-project.md).
+    "open" opens FILE on the interactive page, as "softstart serve FILE" does. "show" lists what is in it.
+    "report" writes the report of the machine and the strategy that are chosen. Names, notes and the choice
+    are edited on the page or in the file, which is TOML (see docs/howto/keep-a-project.md).
 
     Options
     -------
     --check
-        With open: start each optimum again on its machine, and check what it claims.
+        With show: start each optimum again on its machine, and check what it claims.
     --out FILE
         With report: HTML file to write, for example report.html.
     --pdf FILE
@@ -58,11 +63,16 @@ def project_command(
 
     if parts and action != "new":
         raise InputError(f'"{parts[0]}": "{action}" takes one file; leave this word out.')
+    if check and action != "show":
+        raise InputError(f'--check: it goes with "softstart project show"; leave it out of "{action}".')
     if action == "new":
         return _new(Project, Path(file), parts)
     project = Project.open(file)
     if action == "report":
         return written_report(lambda *shown: _report(project, *shown, **steps), to, pdf)
+    if action == "open":
+        serve_page(project, Address())
+        return project.summary, ""
     return _shown(project, file, check)
 
 
@@ -87,7 +97,7 @@ def _shown(project: Project, path: str, check: bool = False) -> tuple[Any, Any]:
             checks[one.name] = max(run.k_dyn for run in one.checked(*map(project.single, one.machines)))
     sheet = project_sheet(project, checks)
     steps = [
-        ("serve", [], "the interactive page"),
+        ("project open", [], "the interactive page"),
         ("project report", ["--out", "report.html"], "its report"),
     ]
     commands = [(shlex.join(["softstart", *name.split(), path, *more]), gives) for name, more, gives in steps]

@@ -63,7 +63,11 @@ def serve_command(*, drive: Loaded | Project, no_browser: bool, **arguments: Any
     --no-browser
         Do not open a browser.
     """
-    address = Address(**arguments)
+    serve_page(drive, Address(**arguments), not no_browser)
+
+
+def serve_page(drive: Loaded | Project, address: Address, browser: bool = True) -> None:
+    """Serve the page of this machine or project until it is interrupted."""
     address.check()
     if address.expose and (address.is_loopback or address.token is None):
         raise InputError(
@@ -80,7 +84,7 @@ def serve_command(*, drive: Loaded | Project, no_browser: bool, **arguments: Any
 
         def ready(url: str) -> None:
             print(f"softstart is at {url}  (Ctrl-C ends it)", flush=True)
-            if not no_browser and address.is_loopback:
+            if browser and address.is_loopback:
                 # some browsers take the terminal until they are closed; the page must not wait for that
                 threading.Thread(target=webbrowser.open, args=(url,), daemon=True).start()
 

@@ -92,6 +92,19 @@ def parsed(text: str, wording: Wording, what: str, tables: Sequence[DocumentTabl
     return document
 
 
+def kind_of_document(document: Mapping[str, Any]) -> str:
+    """What a file holds: "project", "strategy", "duty", or else "machine".
+
+    >>> kind_of_document({"choice": {}}), kind_of_document({"duty": [], "motor": {}})
+    ('project', 'machine')
+    """
+    if {"version", "project", "machine", "choice"} & document.keys():
+        return "project"
+    if {"kind", "profile"} & document.keys():
+        return "strategy"
+    return "duty" if "duty" in document and not {"motor", "shaft", "mass"} & document.keys() else "machine"
+
+
 def _invalid(message: str, text: str) -> tuple[str, str]:
     """Where text is no TOML, and why, from the message of tomllib."""
     match = re.fullmatch(r"(.*) \(at (?:line (\d+), column (\d+)|end of document)\)", message, re.DOTALL)

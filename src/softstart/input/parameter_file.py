@@ -6,10 +6,24 @@ import os
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar, Self
 
-from softstart.input.documents import DocumentTable, apply_changes, document_text, parsed, placed
+from softstart.errors import InputError
+from softstart.input.documents import (
+    DocumentTable,
+    apply_changes,
+    document_text,
+    kind_of_document,
+    parsed,
+    placed,
+)
 from softstart.input.files import Library
 from softstart.input.parameter_set import ParameterSet
 from softstart.input.parameters import Mistake, Parameter, Wording, without_unit
+
+OTHER_FILES = {  # what to do with a file of another kind
+    "project": '"softstart project open FILE" opens it, "softstart project report FILE" writes its report',
+    "strategy": 'it is given as "softstart compare DRIVE --controllers FILE"',
+    "duty": '"softstart duty DRIVE --duty FILE" carries it out',
+}
 
 
 class ParameterFile(ParameterSet):
@@ -41,7 +55,10 @@ class ParameterFile(ParameterSet):
         >>> Drive.from_toml(drive.to_toml()) == drive
         True
         """
-        document = parsed(text, Wording(where, style="toml"), cls.WHAT, cls.TABLES)
+        wording = Wording(where, style="toml")
+        document = parsed(text, wording, cls.WHAT, cls.TABLES)
+        if (kind := kind_of_document(document)) in OTHER_FILES and f"a {kind}" != cls.WHAT:
+            raise InputError(wording.sentence("", f"this is a {kind}, not {cls.WHAT}; {OTHER_FILES[kind]}"))
         return cls._from_document(document, where, also)
 
     @classmethod

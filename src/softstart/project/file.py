@@ -168,6 +168,9 @@ class Project(ParameterFile):
         """From a TOML text; all mistakes at once."""
         before = f"{where}: " if where else ""
         document = parsed(text, Wording(where, style="toml"), cls.WHAT)
+        if {"motor", "mass"} & document.keys():
+            makes = '"softstart project new job.toml FILE" makes a project of it'
+            raise InputError(f"{before}this is a machine, not a project; {makes}.")
         version = document.get("version", VERSION)
         if isinstance(version, int | float) and version > VERSION:
             raise InputError(

@@ -12,7 +12,7 @@ from softstart.controller.finding import controller_of, make_controller, named
 from softstart.controller.tuned import ScheduleFile, read_gains, strategy_text
 from softstart.drive import Duty, Machine
 from softstart.errors import InputError
-from softstart.input.documents import parsed
+from softstart.input.documents import kind_of_document, parsed
 from softstart.input.parameter_set import MaybeNumber, MaybeSeries, Number, ParameterSet, parameter
 from softstart.input.parameters import REQUIRED, Wording
 from softstart.profile import TorqueProfile
@@ -265,9 +265,4 @@ def kind_of(text: str, where: str) -> str:
     """
     if not is_toml(text):
         return "strategy"
-    document = parsed(text, Wording(where, style="toml"), "a machine")
-    if {"version", "project", "machine", "choice"} & document.keys():
-        return "project"
-    if {"kind", "profile"} & document.keys():
-        return "strategy"
-    return "duty" if "duty" in document and not {"motor", "shaft", "mass"} & document.keys() else "machine"
+    return kind_of_document(parsed(text, Wording(where, style="toml"), "a machine"))
