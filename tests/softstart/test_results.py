@@ -14,6 +14,7 @@ from softstart import (
     Chain,
     Clutch,
     Drive,
+    Project,
     TorqueProfile,
     compare,
     engage,
@@ -58,6 +59,15 @@ def test_the_line_of_a_comparison_and_of_a_front_has_their_figures():
     assert repr(front).endswith("Minimum K_dyn 1.010 in 0.4 s.>")
     assert "K_dyn 1.01, K_dyn lower bound 1, " in repr(POINT)
     assert repr(replace(POINT, time=KNOTS[:3])).endswith(", time [3], torque [500]>")
+
+
+def test_what_is_no_strategy_is_told_all_forms_of_one():
+    for given in (3, tuple(np.zeros(1000) for _ in range(3))):
+        with pytest.raises(InputError, match=r"^controller = .*a function of time\.$") as refused:
+            simulate(CRANE, given)
+        assert len(str(refused.value)) < 300
+    assert repr(compare(CRANE, "direct")).startswith("<Comparison: 1 strategy on ")
+    assert repr(Project.new("crane-4amtkf", "hoist-15kw")) == "<Project: crane-4amtkf: 2 machines>"
 
 
 def test_no_result_prints_its_arrays():

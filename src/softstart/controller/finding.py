@@ -102,8 +102,8 @@ def make_controller(
         return name
     if not isinstance(name, str | type):
         raise InputError(
-            f"controller = {name!r}: a controller is a name, path/to/file.py:ClassName, a class, "
-            "or a Controller object."
+            f"controller = {show(name)}: give a name, path/to/file.py:ClassName, a class, a Controller, "
+            "or a torque over time: a TorqueProfile, (times, torques) or a function of time."
         )
     if isinstance(name, str) and is_gain_file(name):
         return controller_of(read_gain_file(Path(name)), Path(name), Path(name).stem, parameters, allow_code)

@@ -200,6 +200,16 @@ class Project(ParameterFile):
         text = super(Project, self.replace(version=VERSION)).to_toml()
         return FIRST + re.sub(r'^(file|notes) = (".*")$', _unfolded, text, flags=re.MULTILINE) + "\n" + LAST
 
+    def __repr__(self) -> str:
+        """One line with what is in it.
+
+        >>> Project.new("crane-4amtkf")
+        <Project: crane-4amtkf: 1 machine>
+        """
+        counts = {kind: len(getattr(self, rows)) for kind, rows in KINDS.items()}
+        parts = [f"{n} {kind if n == 1 else KINDS[kind]}" for kind, n in counts.items() if n]
+        return f"<Project: {self.name}: {', '.join(parts) or 'empty'}>"
+
     def blocks(self) -> Iterator[tuple[str, DocumentTable, ParameterSet]]:
         """Single tables first."""
         return iter(sorted(super().blocks(), key=lambda block: block[1].many))

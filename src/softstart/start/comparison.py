@@ -42,7 +42,7 @@ from softstart.start.recommendation import (
 from softstart.start.run import Run
 from softstart.start.setting import Judge, for_limits, over_time
 from softstart.start.simulation import DEFAULT_DRIVE, simulate
-from softstart.views.numbers import units_of
+from softstart.views.numbers import plural, units_of
 
 REFERENCE = metrics.REFERENCE
 WORN_GAP = 4.0
@@ -189,7 +189,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
         """
         rows = sorted(self.rows, key=lambda row: row.run.k_dyn)
         ends = " to ".join(f"{row.run.k_dyn:.3f} ({row.name})" for row in (rows[0], rows[-1])[: len(rows)])
-        return f"<Comparison: {len(rows)} strategies on {self.drive.name}, K_dyn {ends}>"
+        return f"<Comparison: {plural(len(rows), 'strategy')} on {self.drive.name}, K_dyn {ends}>"
 
     @cached_property
     def recommendation(self) -> Recommendation:

@@ -211,10 +211,10 @@ def plural(count: int, noun: str) -> str:
 def plural_of(noun: str) -> str:
     """The noun of several things.
 
-    >>> plural_of("start"), plural_of("duty")
-    ('starts', 'duties')
+    >>> plural_of("start"), plural_of("strategy")
+    ('starts', 'strategies')
     """
-    return f"{noun.removesuffix('y')}ies" if noun.endswith("ty") else f"{noun}s"
+    return f"{noun.removesuffix('y')}ies" if noun.endswith(("ty", "gy")) else f"{noun}s"
 
 
 def with_unit(value: float, unit: str) -> str:
