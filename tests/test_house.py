@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parent.parent
-MOST = {"src, controllers": 44931, "tests": 31082}
+MOST = {"src, controllers": 44988, "tests": 31130}
 LONGEST_FILE = 560  # statements
 LONGEST_FUNCTION = 70  # statements
 Function = ast.FunctionDef | ast.AsyncFunctionDef

@@ -429,7 +429,8 @@ class Units(NamedTuple):
 
         The values are in SI: an angle that `shortest` writes in deg is one that somebody gave in deg; if
         they all are, that is the unit. `at output` asks for the output of the `gear`, a `Gear`, or is
-        refused with this reason. Raises `RefusedError` for a text that names no such units, or two of a kind.
+        refused with this reason; values that have few figures there were given there. Raises `RefusedError`
+        for a text that names no such units, or two of a kind.
 
         >>> Units.read("", [0.06981317007977318], [92.1533845053006])
         Units(angle='deg', speed='rpm', diameter=0.0, torque='N*m', gear=None)
@@ -456,9 +457,12 @@ class Units(NamedTuple):
             if same.keys() & fields.keys():
                 raise RefusedError(f"{show(part)} is the second of its kind; name one")
             fields |= same
+        behind: Any = fields.get("gear")
         for key, si, values in (("angle", "rad", angles), ("speed", "rad/s", speeds)):
-            written = {shortest(value, si).partition(" ")[2] for value in values if value}
-            fields.setdefault(key, written.pop() or si if len(written) == 1 else si)
+            there = {behind and _few_figures(behind.to_output(value, si), si) for value in values if value}
+            here = {shortest(value, si).partition(" ")[2] or si for value in values if value}
+            unit = there.pop() if len(there) == 1 else None
+            fields.setdefault(key, unit or (here.pop() if len(here) == 1 else si))
         return cls(**fields)
 
     @property
@@ -476,6 +480,11 @@ class Units(NamedTuple):
     def at(self) -> str:
         """What a title or an axis adds, once: the shaft, where it is not that of the motor."""
         return ", at the output" if self.gear else ""
+
+    @property
+    def behind(self) -> str:
+        """The same behind a quantity in a sentence."""
+        return self.at.replace(",", "")
 
     @property
     def at_motor(self) -> Units:
@@ -536,6 +545,34 @@ class Units(NamedTuple):
     def is_at_output(self, si: str) -> bool:
         """Whether a quantity of this SI unit has another value at the shaft asked for."""
         return self.gear is not None and self.gear.factor(si) is not None
+
+
+def _few_figures(value: float, unit: str) -> str:
+    """The unit in which a value, brought over to another shaft, is short; "" for none.
+
+    >>> [_few_figures(math.radians(one), "rad") for one in (9.0 / 60.0, 0.25, 2.0, 2.0 / 3.0)]
+    ['arcmin', 'arcmin', 'deg', 'arcmin']
+    >>> _few_figures(0.5 / 38.1, "rad"), _few_figures(0.003, "rad")
+    ('', 'rad')
+    """
+    found = {}
+    for one in (unit, *TYPED[unit]):
+        text = f"{value / ORDINARY.get((one, unit), 1.0):.{MOST_DIGITS}g}"
+        if len(text) <= MOST_DIGITS and math.isclose(
+            cast("float", parse(f"{text} {one}", unit)), value, rel_tol=1e-12
+        ):
+            found[one] = len(text)
+    return min(found, key=found.__getitem__, default="")
+
+
+def seen_from(text: str, output: bool) -> str:
+    """The units of a text, as `Units.read` has it, at the output or at the motor shaft.
+
+    >>> seen_from("deg, at output, kN m", False), seen_from("deg", True), seen_from("", True)
+    ('deg, kN m', 'deg, at output', 'at output')
+    """
+    parts = [one for one in map(str.strip, text.split(",")) if one and not _SHAFT.fullmatch(one)]
+    return ", ".join([*parts, *["at output"] * output])
 
 
 _SHAFT = re.compile(r"at\s+(?:the\s+)?(output|motor)(?:\s+shaft)?", re.IGNORECASE)

@@ -20,6 +20,7 @@ from softstart import (
     compare,
     fatigue,
     optimize,
+    parameter_sheet,
     pareto,
     report,
     scenarios_of,
@@ -30,10 +31,11 @@ from softstart.cli.main import main
 from softstart.input.gear import NO_GEAR, NO_OUTPUT, Gear
 from softstart.quantities import RefusedError
 from softstart.reporting.document import data_of, strategies
+from softstart.reporting.sheet_view import notes, settings, starts
 from softstart.views.fatigue import fatigue_tables
 from softstart.views.identification import plan_table
 from softstart.views.numbers import TextTable, seen_at, units_of
-from softstart.views.optima import optimum_sheet, scenario_table
+from softstart.views.optima import bound_sentence, optimum_sheet, scenario_table
 from softstart.views.starts import comparison_table, machine_lines, run_sheet
 from softstart.views.tuning import tuning_sheet
 
@@ -67,6 +69,7 @@ def results() -> SimpleNamespace:
         lives=fatigue([simulate(drive, one) for one in ("direct", "ramp")]),
         best=optimize(drive, 0.4),
         report=report(drive, controllers=["ramp"], budget=0.0),
+        sheet=parameter_sheet(drive, "speed-ramp"),
         tuning=tune(drive, "reduced-first-stage", ["0.5x", "1x"], ["1x", "2x"], free=["torque"], **QUICK),
     )
 
@@ -157,6 +160,10 @@ def test_every_value_is_that_of_json_through_the_gear(gear: Gear, units: str) ->
     facts = dict(map(tuple, optimum_sheet(found.best).facts))
     number, unit = re.match(r"(\S+) (\w+ \w+) at ", facts["peak shaft torque"]).groups()
     assert float(number) == pytest.approx(there(gear, unit, found.best.summary()["peak_torque"]), rel=5.1e-6)
+    low, high, unit = re.search(
+        r"from (\S+) to (\S+) (\w+ \w+) at the output", bound_sentence(found.best)
+    ).groups()
+    assert (float(low), float(high)) == pytest.approx((0.0, there(gear, unit, drive.Ms)), rel=5.1e-6)
     # tune
     torques = [one for row in found.tuning.summary()["schedule"]["torque"] for one in row]
     schedule, robust = tuning_sheet(found.tuning).tables[:2]
@@ -180,6 +187,35 @@ def test_every_value_is_that_of_json_through_the_gear(gear: Gear, units: str) ->
     assert float(limit[2]) == pytest.approx(permitted / SIZES[limit[3]], rel=5.1e-6)
     peaks = sorted(found.report.summary()["strategies"], key=lambda one: one["k_dyn"])
     check(strategies(found.report), "peak", gear, [one["peak_torque"] for one in peaks])
+
+
+@pytest.mark.parametrize(("gear", "units"), gears())
+def test_a_sheet_sets_the_motor_and_says_what_that_is_at_the_output(gear: Gear, units: str) -> None:
+    """Its values, the starts with them, and its notes; what is typed into the inverter is the motor's."""
+    found, drive = results().sheet, results().drive
+    own = [row[:3] for row in settings(found).rows]
+    for one in (drive, found.exact.drive, found.rounded.drive):
+        through(found, one, gear, f"{units}, at output")
+    rows = settings(found).rows
+    assert [[*row[:2], row[2].removesuffix(" of the motor")] for row in rows] == own
+    for setting, row in zip(found.settings, rows, strict=True):
+        if setting.unit in ("N*m", "N*m*s/rad"):
+            number, unit = row[3].split(" ", 1)
+            value = float(gear.to_output(setting.rounded, setting.unit))
+            assert agrees(number, value / SIZES[unit.removesuffix(" s/rad")])
+    check(starts(found), "peak torque", gear,
+          [found.exact.peak_torque, found.rounded.peak_torque, found.worst_peak])  # fmt: skip
+    said = re.search(
+        r"of (\S+) (\w+ \w+) at the output, (\S+) .* takes: (\S+) \w+ \w+ at the output \((\S+) %",
+        " ".join(notes(found)),
+    )
+    number, unit, motor, limit, percent = said.groups()
+    rated = float(drive.rated)
+    assert float(number) == pytest.approx(there(gear, unit, rated), rel=5.1e-5)
+    assert float(motor) == pytest.approx(rated / SIZES[unit], rel=5.1e-5)
+    assert float(limit) == pytest.approx(there(gear, unit, 0.01 * float(percent) * rated), rel=1e-4)
+    for one in (drive, found.exact.drive, found.rounded.drive):
+        through(found, one, gear, "")
 
 
 def test_the_report_says_the_shaft_once_in_each_part() -> None:

@@ -10,7 +10,7 @@ from softstart import Chain, Drive, InputError
 from softstart.input.gear import NO_GEAR, NO_OUTPUT, Gear
 from softstart.input.parameters import at_motor
 from softstart.quantities import RefusedError, Units, parse
-from softstart.views.numbers import units_of
+from softstart.views.numbers import seen, seen_at, units_of
 
 GEAR = Gear(38.1, 0.95)
 CRANE = Drive.load("crane-4amtkf")
@@ -77,6 +77,24 @@ def test_what_is_shown_is_read_back(ratio: float, efficiency: float, value: floa
         )
         digits = units.rounded(value, parameter.unit, 4)
         assert digits == pytest.approx(value, rel=5.1e-4, abs=1e-300)
+
+
+@given(
+    st.floats(1.5, 200.0).map(lambda x: float(f"{x:.4g}")),
+    st.one_of(
+        st.integers(1, 59).map(lambda n: f"{n} arcmin"), st.integers(1, 9).map(lambda n: f"{n} deg"),
+        st.integers(1, 400).map(lambda n: f"{n / 1000!r} rad"),
+    ),
+    st.booleans(),
+)  # fmt: skip
+def test_an_angle_without_a_named_unit_is_shown_as_it_was_given(ratio: float, text: str, file: bool) -> None:
+    """At the output, where it was given; also from the file of the drive, which has it at the motor."""
+    drive = CRANE.replace(gear_ratio=ratio, gap=f"{text} at output", start_position="mid-gap")
+    drive = seen_at(Drive.from_toml(drive.to_toml()) if file else drive, "output")
+    assert seen(drive.gap, "rad", units_of(drive)) == text
+    assert units_of(drive.replace(units="deg, at output")).angle == "deg"  # where one is named, that
+    given_at_motor = CRANE.replace(gear_ratio=37.3, gap="4 deg", units="at output")
+    assert units_of(given_at_motor).angle == "deg"
 
 
 def test_ratio_1_changes_the_label_alone() -> None:

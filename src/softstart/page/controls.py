@@ -12,6 +12,7 @@ from softstart.page.frames import SERVER, FrameBuilder
 from softstart.page.machines import DIGITS, NODE_DIGITS, FormField
 from softstart.page.sentences import sentence_of
 from softstart.page.session import Session
+from softstart.quantities import seen_from
 
 DRIFT = 2e-4  # of two clocks against one another: more than real ones have
 LARGEST = 1e15  # beyond any number of a message: clocks in ms, positions, values
@@ -121,8 +122,8 @@ class Controls:
             )
         units = self._session.inputs.units
         words = entry.seen(units).typed(" ".join(text.split()), entry.unit)
-        if path == "units" and words and units.gear and "at " not in words:  # the switch beside it says which
-            words += ", at output"
+        if path == "units" and units.gear and "at " not in words:  # the switch beside it says which
+            words = seen_from(words, True)
         if not (words or entry.optional):
             raise InputError(f"{path}: the field is empty; write for example {entry.example}.")
         self._session.set(path, words or None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import secrets
 from base64 import b64encode
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,7 +23,7 @@ from softstart.page.duty_frames import duty_view, json_number
 from softstart.page.machines import STRATEGY, Axes, FormField
 from softstart.page.sentences import Value, differences, page_sentence, sentence_of, written
 from softstart.page.session import LONGEST_DUTY, EqualTime, Inputs, Reference, Session, Strategy
-from softstart.quantities import Units
+from softstart.quantities import Units, seen_from
 from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
 from softstart.views.drawing import strategy_colours
@@ -428,7 +427,7 @@ def machine_fields(session: Session, entries: Mapping[str, FormField]) -> dict[s
         if " " in text and " " in typed:  # with a unit of its own, as it was typed: 36 arcmin or 0.6 deg
             text = typed
         if path == "units":
-            text = re.sub(r"(, *)?at [a-z ]+", "", text) or units.at_motor.text  # the shaft has a switch
+            text = seen_from(text, False) or units.at_motor.text  # the shaft has a switch
         fields[path] = field_view(entry, text, value, [("as loaded", loaded)], units)
     return fields
 

@@ -25,7 +25,7 @@ from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, sentence_of
 from softstart.project import Project, StoredOptimum
-from softstart.quantities import Units
+from softstart.quantities import Units, seen_from
 from softstart.start.comparison import (
     REFERENCE,
     SOFT_END,
@@ -361,13 +361,13 @@ class Session:
         >>> session = Session()
         >>> session.show_at(True)
         Traceback (most recent call last):
-        softstart.errors.InputError: units = "rad, rpm, at output": without gear.ratio nothing ...
+        softstart.errors.InputError: units = "at output": without gear.ratio nothing ...
         >>> session.set("gear.ratio", 38.0)
         >>> session.show_at(True)
         >>> session.inputs.units.text
         'rad, rpm, at output'
         """
-        self.set("units", self.inputs.units.at_motor.text + (", at output" if output else ""))
+        self.set("units", seen_from(self.inputs.machine.units, output))
 
     def set_duty(self, plan: DutyPlan, gesture: str = "") -> None:
         """Another duty; also one whose steps cannot follow one another, which `duty_result` says.

@@ -252,6 +252,7 @@ def document(report: Report) -> str:
 def start_in_words(drive: Any, rows: Sequence[Row] = ()) -> str:
     """Where the starts of a figure begin, and at which shaft they are seen; each of `rows` from its worst.
 
+    >>> from softstart import Drive
     >>> start_in_words(Drive.load("crane-4amtkf"))
     'Start in the middle of the gap; torques and speeds at the motor shaft.'
     """

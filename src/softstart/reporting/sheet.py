@@ -24,6 +24,7 @@ from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, SimulationError
 from softstart.linear.view import loop_in_words
+from softstart.quantities import Units
 from softstart.results import OneLine, Result
 from softstart.start.batch import prepared
 from softstart.start.comparison import Uncertain, as_far_as_known, compare, compared, make_controllers
@@ -34,6 +35,7 @@ from softstart.start.results import limited_time
 from softstart.start.run import Run
 from softstart.start.settings import EVEN, Setting, rounded_settings, step_multiple
 from softstart.start.simulation import simulate
+from softstart.views.numbers import IN_SI, seen
 
 WITHOUT_CODE = ("direct", "ramp", "s-curve", "speed-ramp")  # which an inverter has
 ORDINARY = ("ramp", "s-curve")  # whose sheets say how an inverter names their settings
@@ -237,7 +239,7 @@ class ParameterSheet(Result):
         """What a setting is set to, SI."""
         return float(next(one.rounded for one in self.settings if one.name == name))
 
-    def torque_limits(self, drive: Drive) -> list[str]:
+    def torque_limits(self, drive: Drive, units: Units = IN_SI) -> list[str]:
         """The torque limits that leave this start as it is, in steps of the inverter."""
         demand = (self.rounded or self.exact).u
         (rated, basis), step, found = rated_torque(drive), self.torque_step, []
@@ -245,7 +247,11 @@ class ParameterSheet(Result):
             if torque:
                 limit = math.copysign(math.ceil(abs(torque) / step * (1.0 - EVEN)) * step, torque)
                 percent = step_multiple(100.0 * limit / rated, 100.0 * step / rated)
-                found.append(f"{step_multiple(limit, step)} N m ({percent} % of the {basis})")
+                own = units == units._replace(torque="N*m", gear=None)
+                text = (
+                    f"{step_multiple(limit, step)} N m" if own else seen(limit, "N*m", units) + units.behind
+                )
+                found.append(f"{text} ({percent} % of the {basis})")
         return found
 
     def summary(self) -> dict[str, Any]:

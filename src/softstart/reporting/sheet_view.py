@@ -6,6 +6,7 @@ import math
 
 from softstart.controller.tuned import GainSchedule
 from softstart.errors import listed
+from softstart.quantities import Units
 from softstart.reporting.inverters import at_inverters, inverters, speed_values
 from softstart.reporting.sheet import ParameterSheet
 from softstart.start.resolution import RATED, gain_base, rated_torque
@@ -16,8 +17,11 @@ from softstart.views.numbers import (
     column_of,
     number,
     plural,
+    seen,
     short,
+    titled,
     units_of,
+    with_unit,
 )
 from softstart.views.sheet import Sheet
 from softstart.views.starts import machine_lines
@@ -40,9 +44,11 @@ def shown_sheet(sheet: ParameterSheet) -> Sheet:
 def settings(sheet: ParameterSheet) -> TextTable:
     """The values; no rows where they could not be rounded."""
     what, rows, drive = inverters()["setting"], list[list[str]](), sheet.drive.design_drive
+    units = units_of(sheet.drive)
     for one in sheet.settings if sheet.rounded else ():
-        rows.append([one.name.replace("_", " "), *one.shown(drive), what.get(one.name, one.meaning)])
-    heads = [("parameter", False), ("set to", True), ("unit", False), ("that is", True), ("exact", True)]
+        rows.append([one.name.replace("_", " "), *one.shown(drive, units), what.get(one.name, one.meaning)])
+    that_is = f"that is{units.at}".replace(", ", ",\n")
+    heads = [("parameter", False), ("set to", True), ("unit", False), (that_is, True), ("exact", True)]
     columns = [Column(*one) for one in (*heads, ("what it is at the inverter", False))]
     return TextTable("", columns, rows, keys=1)
 
@@ -63,8 +69,9 @@ def at_each_inverter(sheet: ParameterSheet) -> TextTable:
             ["Kp in per cent of torque per per cent of speed", percent],
             *map(list, at_inverters(sheet.values, drive)),
         ]
+    where = ", at the motor shaft" if units_of(sheet.drive).gear else ""
     return TextTable(
-        f"{sheet.name} at inverters", [Column("inverter", False), Column("settings", False)], rows
+        f"{sheet.name} at inverters{where}", [Column("inverter", False), Column("settings", False)], rows
     )
 
 
@@ -85,12 +92,12 @@ def starts(sheet: ParameterSheet) -> TextTable:
     columns = {
         "start with": [name for name, *_ in found],
         "K_dyn": [number(k_dyn, 4) for _, k_dyn, *_ in found],
-        f"peak torque{units.at}\n{units.label('N*m')}": column_of([units.shown(p, "N*m") for p in peaks]),
+        f"peak torque\n{units.label('N*m')}": column_of([units.shown(p, "N*m") for p in peaks]),
     }
     if sheet.drive.gear and not units.gear:
         columns[f"at the output\n{units.label('N*m')}"] = [at_output(sheet.drive, peak) for peak in peaks]
     columns[f"{exact.limited_name}\ns"] = column_of([time for *_, time in found], 5)
-    return TextTable.of(f"{sheet.name}: started again after rounding", columns, ["start with"])
+    return TextTable.of(titled(f"{sheet.name}: started again after rounding", units), columns, ["start with"])
 
 
 def cells(sheet: ParameterSheet) -> TextTable:
@@ -99,10 +106,10 @@ def cells(sheet: ParameterSheet) -> TextTable:
     gaps = [units.shown(one["gap"], "rad") for one in found]
     inertias = [units.shown(one["load_inertia"], "kg*m^2") for one in found]
     return TextTable.of(
-        f"{sheet.name}: all cells that it was tuned for",
+        titled(f"{sheet.name}: all cells that it was tuned for", units),
         {
-            f"gap{units.at}\n{units.angle}": column_of(gaps),
-            f"load inertia{units.at}\nkg m2": column_of(inertias),
+            f"gap\n{units.angle}": column_of(gaps),
+            "load inertia\nkg m2": column_of(inertias),
             "K_dyn\nexact": [number(one["k_dyn"], 4) for one in found],
             "K_dyn\nof the sheet": [number(one["k_dyn_rounded"], 4) for one in found],
             "start time\nexact, s": column_of([one["start_time"] for one in found], 5),
@@ -137,7 +144,7 @@ def outcome(sheet: ParameterSheet) -> str:
 
 def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
     """What else is to be known of the values; with `code` where the program of the strategy is from."""
-    drive = sheet.drive.design_drive
+    drive, units = sheet.drive.design_drive, units_of(sheet.drive)
     (rated, basis), found = rated_torque(drive), [sheet.loop]
     if sheet.margins and sheet.rounded:
         found.append(f"With these values: {'; '.join(map(str, sheet.margins))}.")
@@ -152,10 +159,10 @@ def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
         every = "all combinations of" if sheet.corners else "each value alone, and all together,"
         found.append(f"Half a step off: {sheet.variants} starts, {every} half a step down or up.")
         found += _half_a_step_off(sheet)
-    limits = listed(sheet.torque_limits(drive))
+    limits = listed(sheet.torque_limits(drive, units))
     current = " A limit of the torque-producing current: the same percentages." if basis == RATED else ""
     found.append(
-        f"100 % of torque is the {basis} of {short(float(f'{rated:.5g}'))} N m. Torque limits of the "
+        f"100 % of torque is the {basis} of {torque_in_words(rated, units)}. Torque limits of the "
         f"inverter, not tighter than what this start takes: {limits}.{current}"
     )
     if coarse := [one.name.replace("_", " ") for one in sheet.settings if one.coarse]:
@@ -177,11 +184,13 @@ def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
 
 def _half_a_step_off(sheet: ParameterSheet) -> list[str]:
     """What values half a step off may break."""
-    permitted, found = sheet.drive.limits.shaft_torque, list[str]()
+    permitted, found, units = sheet.drive.limits.shaft_torque, list[str](), units_of(sheet.drive)
     if permitted is not None and sheet.worst_peak > permitted:
+        peak, of = column_of([float(units.shown(sheet.worst_peak, "N*m"))])[0], units.label("N*m")
         found.append(
-            f"Half a step off the shaft torque may reach {column_of([sheet.worst_peak])[0]} N m, more than "
-            f"the {short(float(permitted))} N m that are permitted: set these values exactly, or finer ones."
+            f"Half a step off the {'output' if units.gear else 'shaft'} torque may reach {peak} {of}, more "
+            f"than the {seen(float(permitted), 'N*m', units)} that are permitted: set these values exactly, "
+            "or finer ones."
         )
     if math.isnan(sheet.worst_k_dyn):
         found.append("In at least one of them the load does not reach its target speed: set finer steps.")
@@ -190,11 +199,12 @@ def _half_a_step_off(sheet: ParameterSheet) -> list[str]:
 
 def _ramps(sheet: ParameterSheet, rated: float, basis: str) -> list[str]:
     """The ramp of the torque as other inverters ask for it, and the S-curve in ms."""
-    found = []
+    found, units = list[str](), units_of(sheet.drive)
     if rise := sheet.full_rise:
+        mean = column_of([float(units.shown(rated / rise.exact, "N*m/s"))])[0]
         found.append(
             "Some inverters ask for the time of a ramp from 0 to 100 % of torque: that is "
-            f"{_ms(rise.exact)}, a mean rise of {column_of([rated / rise.exact])[0]} N m/s. Set to "
+            f"{_ms(rise.exact)}, a mean rise of {mean} {units.label('N*m/s')}{units.behind}. Set to "
             f"{short(1e3 * rise.rounded)} ms the rise takes {_ms(rise.rise)}, K_dyn is "
             f"{number(rise.run.k_dyn, 4)} and the start time {_time(rise.run.start_time)}."
         )
@@ -213,6 +223,20 @@ def _ramps(sheet: ParameterSheet, rated: float, basis: str) -> list[str]:
             "beginning and at the end of the rise."
         )
     return found
+
+
+def torque_in_words(torque: float, units: Units) -> str:
+    """A torque of the motor as it is seen and, where that is at the output, at the motor shaft.
+
+    >>> from softstart.input.gear import Gear
+    >>> torque_in_words(23.87, Units(torque="kN*m", gear=Gear(38.0, 0.95)))
+    '0.86171 kN m at the output, 0.02387 kN m at the motor shaft'
+    """
+    here = seen(float(f"{torque:.5g}"), "N*m", units.at_motor)
+    if not units.gear:
+        return here
+    there = with_unit(float(f"{units.shown(torque, 'N*m'):.5g}"), units.label("N*m"))
+    return f"{there} at the output, {here} at the motor shaft"
 
 
 def _time(seconds: float) -> str:

@@ -9,9 +9,10 @@ from typing import Any
 from softstart.controller.base import Controller
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive
+from softstart.quantities import Units
 from softstart.start.resolution import Resolution, gain_base, nearest_step, rated_torque
 from softstart.start.setting import rounded as rounded_down
-from softstart.views.numbers import RPM, column_of, decimals_of, number, short, unit
+from softstart.views.numbers import IN_SI, RPM, column_of, decimals_of, number, short, unit
 
 OFF_AT_0 = ("preload", "filter_time")  # 0 is none of it, not a value that may be half a step off
 GAIN = "N*m*s/rad"  # of a speed controller
@@ -75,8 +76,11 @@ class Setting:
             return share, name
         return 1.0, unit(self.unit)
 
-    def shown(self, drive: Drive) -> tuple[str, str, str, str]:
-        """What to set, its unit, the same in another one, and the exact value; all in ASCII."""
+    def shown(self, drive: Drive, units: Units = IN_SI) -> tuple[str, str, str, str]:
+        """What to set, its unit, the same as it is seen, and the exact value; all in ASCII.
+
+        What is set is the motor's, wherever the rest is seen.
+        """
         if isinstance(self.exact, str) or isinstance(self.rounded, str):
             return str(self.rounded), "", "", str(self.exact)
         share, name = self.unit_at_inverter(drive)
@@ -84,8 +88,13 @@ class Setting:
         if self.name in KEPT:
             return short(value), name, "or less", exact
         text = short(value) if self.step is None else step_multiple(value, self.step / share)
-        other = "" if name in (unit(self.unit), "ms") else f"{column_of([self.rounded])[0]} {unit(self.unit)}"
-        return text, name, other, exact
+        if "frequency" in self.name or (units.of(self.unit) == name and not units.gear):
+            units = IN_SI  # no gear makes another frequency; what is set is not said twice
+        there, other = units.is_at_output(self.unit), ""
+        if there or name not in (unit(units.of(self.unit)), "ms"):
+            shown = float(units.shown(self.rounded, self.unit))
+            other = f"{column_of([shown])[0]} {unit(units.of(self.unit))}"
+        return text, name + " of the motor" * (there and "%" not in name), other, exact
 
 
 def is_short(step: float) -> bool:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from softstart.drive import Machine
 from softstart.input.parameters import Parameter
-from softstart.quantities import RefusedError, Units
+from softstart.quantities import RefusedError, Units, seen_from
 
 NOTHING, DASH = "-", "\N{EN DASH}"  # for a missing value
 IN_SI = Units()
@@ -310,6 +310,8 @@ def units_of(machine: Machine, given: Machine | None = None) -> Units:
     >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=38.0, units="kN m, at output")
     >>> units_of(crane).shown(50.0, "N*m")
     1.9
+    >>> units_of(crane.replace(gap="9 arcmin at output")).angle  # at the motor shaft 5.7 deg
+    'arcmin'
     """
     given = given or machine
     speeds = () if given.target_speed is None else (float(given.target_speed),)
@@ -328,14 +330,13 @@ def seen_at(machine: Any, shaft: str) -> Any:
     Raises `RefusedError`, the reason, where it has no output.
 
     >>> from softstart import Drive
-    >>> seen_at(Drive.load("hoist-15kw").replace(gear_ratio=45.0), "output").units
-    'deg, rpm, at output'
+    >>> seen_at(Drive.load("hoist-15kw").replace(gear_ratio=45.0, units="deg"), "output").units
+    'deg, at output'
     """
     gear = machine.gear or machine.gear_with()
     if shaft == "output" and isinstance(gear, str):
         raise RefusedError(gear)
-    units = units_of(machine)._replace(gear=gear if shaft == "output" else None)
-    return machine.replace(units=units.text)
+    return machine.replace(units=seen_from(machine.units, shaft == "output"))
 
 
 _read = lru_cache(maxsize=64)(Units.read)  # the page asks some forty times a frame

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from softstart.optimal.front import Front
 from softstart.optimal.result import Optimum
+from softstart.quantities import Units
 from softstart.start.metrics import REFERENCE
 from softstart.start.recommendation import margins_of
 from softstart.start.run import Run
@@ -226,6 +228,25 @@ def scenario_table(best: Optimum) -> TextTable:
     return TextTable.of_data("", SCENARIOS, rows, units_of(best.problem.drive), bold=[best.worst])
 
 
+_TORQUES = re.compile(r"from (\S+) to (\S+) N m(?: at the motor shaft)?")  # what results are saved with
+
+
+def covers_seen(text: str, units: Units) -> str:
+    """What a bound covers, its torques as they are seen.
+
+    >>> covers_seen("every torque from 0 to 62 N m over time", Units(torque="kN*m"))
+    'every torque from 0 to 0.062 kN m over time'
+    """
+    if not units.gear and units.torque == "N*m":
+        return text
+
+    def there(found: re.Match[str]) -> str:
+        low, high = (short(float(units.shown(float(one), "N*m"))) for one in found.groups())
+        return f"from {low} to {high} {units.label('N*m')}{units.behind}"
+
+    return _TORQUES.sub(there, text)
+
+
 def bound_sentence(best: Optimum) -> str:
     """What the lower bound covers."""
     kept, bound = best.kept, best.bound
@@ -234,11 +255,12 @@ def bound_sentence(best: Optimum) -> str:
         return f"The lower bound of the start time covers {kept.covers}".rstrip(".") + f".{unchecked}"
     if bound.kind == "none":
         return f"No lower bound is known: {bound.covers}" if bound.covers else "No lower bound."
-    said = f"The lower bound ({bound.kind}) covers {bound.covers}".rstrip(".") + "."
+    units = units_of(best.problem.drive)
+    said = f"The lower bound ({bound.kind}) covers {covers_seen(bound.covers, units)}".rstrip(".") + "."
     once = best.bound_once
     if once is None or once.k_dyn <= bound.k_dyn:
         return said
-    return f"{said} That of {number(once.k_dyn, 6)} covers {once.covers}."
+    return f"{said} That of {number(once.k_dyn, 6)} covers {covers_seen(once.covers, units)}."
 
 
 def optimum_figure(best: Optimum) -> Figure:
@@ -388,7 +410,8 @@ def _footnotes(front: Front) -> list[str]:
         if not point.found:
             notes.append(point.status_text)
         elif point.bound_covers:
-            notes.append(f"Lower bound ({point.bound_kind}): {point.bound_covers}".rstrip(".") + ".")
+            covers = covers_seen(point.bound_covers, units_of(front.drive))
+            notes.append(f"Lower bound ({point.bound_kind}): {covers}".rstrip(".") + ".")
     for one in front.controllers:
         if one.optimum is not None and one.k_dyn < (one.optimum.k_dyn_lower_bound or 0.0):
             notes.append(
