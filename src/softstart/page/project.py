@@ -86,8 +86,8 @@ def starts_alike(machine: Machine, other: Machine) -> bool:
 
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
-    >>> starts_alike(crane, crane.replace(shaft_torque=80.0)), starts_alike(crane, crane.replace(gap=1.0))
-    (True, False)
+    >>> [starts_alike(crane, crane.replace(**one)) for one in ({"permissible_torque": 80.0}, {"gap": 1.0})]
+    [True, False]
     """
     changed = [one for one in changes(machine, other) if one.parameter.name not in WORDS]
     return type(machine) is type(other) and all(one.path.startswith("limits.") for one in changed)
