@@ -718,6 +718,8 @@ def _wrong_kind(written: str, number: str, found: Unit, quantity: Quantity) -> s
     elif found.dimensions == _known(unit.removesuffix("/rad")).dimensions:
         what = f"but {quantity.noun} is per angle"
         remedy = f'write "{number} {written}/rad" or "{number} {written}/deg"'
+    elif unit == "rad" and written in ("min", "sec", "s"):
+        remedy = f'write "{number} arc{"min" if written[0] == "m" else "sec"}" if that is meant'
     elif unit == "N*m" and other in ("a stiffness", "an energy"):
         remedy = f'write "{number} N*m" if that is meant'
     return f"{written} is {other}, {what}; {remedy}"

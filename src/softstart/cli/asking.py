@@ -87,7 +87,8 @@ class _Answers:
         about = machine in ABOUT.get(p.name, (machine,))
         after = any(map(self.known, AFTER.get(p.name, ()))) or p.name not in AFTER
         instead = any(map(self.known, UNLESS.get(p.name, ())))
-        return p.path not in self.settings and about and after and not instead
+        asked = p.path not in self.settings and p.name != "units"  # a matter of taste, for a file
+        return asked and about and after and not instead
 
     def needed(self, p: Parameter) -> bool:
         """Whether it cannot be left empty."""

@@ -56,7 +56,8 @@ def duty_command(
     Options
     -------
     --controller NAME
-        A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).
+        A strategy: its name, path/to/file.py:ClassName, a file of tuned gains (.toml), or a torque
+        profile (.csv).
     --controllers A,B,...
         Compare these strategies instead, separated by commas.
     --compare

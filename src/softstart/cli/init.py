@@ -101,7 +101,9 @@ def init_command(*, sheet: str | None, out: str | None, ask: bool, template: boo
     # the drive file has one end only
     if isinstance(data_sheet.possible, UnknownStiffness) and (sheet or asks):
         path = shlex.quote(sheet or str(kept))
-    sentence(console(), f"{out} is written.{assumed} What next: softstart compare {path}")
+    sentence(
+        console(), f"{out} is written: {data_sheet.motion}.{assumed} What next: softstart compare {path}"
+    )
 
 
 def _both_ends(sheet: DataSheet) -> list[str]:

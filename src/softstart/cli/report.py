@@ -117,7 +117,8 @@ def sheet_command(
     Options
     -------
     --controller NAME
-        A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).
+        A strategy: its name, path/to/file.py:ClassName, a file of tuned gains (.toml), or a torque
+        profile (.csv).
     --param KEY=VALUE
         Set a parameter of the strategy, for example time='200 ms'. May be repeated.
     --resolution KEY=STEP,...

@@ -46,8 +46,9 @@ def compare_command(
 
     DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
     tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
-    drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, or a
-    file of tuned gains. BESIDE is another machine of the same kind: one table and one figure show both.
+    drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, a file
+    of tuned gains, or a torque profile (.csv). BESIDE is another machine of the same kind: one table and one
+    figure show both.
 
     Options
     -------
@@ -131,7 +132,8 @@ def simulate_command(
     Options
     -------
     --controller NAME
-        A strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).
+        A strategy: its name, path/to/file.py:ClassName, a file of tuned gains (.toml), or a torque
+        profile (.csv).
     --param KEY=VALUE
         Set a parameter of the strategy, for example time='200 ms'. May be repeated.
     --out DIR

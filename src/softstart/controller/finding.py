@@ -72,7 +72,8 @@ def make_controller(
     Parameters
     ----------
     name : str, Controller or subclass of Controller
-        A name, `path/to/file.py:ClassName`, a file of tuned gains (.toml), a class, or a finished controller.
+        A name, `path/to/file.py:ClassName`, a file of tuned gains (.toml), a torque profile (.csv), a class,
+        or a finished controller.
     parameters : mapping, optional
         Its parameters: SI numbers or strings with a unit.
     allow_code : bool
@@ -107,6 +108,8 @@ def make_controller(
         )
     if isinstance(name, str) and is_gain_file(name):
         return controller_of(read_gain_file(Path(name)), Path(name), Path(name).stem, parameters, allow_code)
+    if isinstance(name, str) and name.lower().endswith(".csv"):
+        return named(make_controller("profile", {"file": name, **(parameters or {})}), Path(name).stem)
     cls = controller_class(name)
     name = name if isinstance(name, str) else label_of(cls)
     values, wrong = _values(cls, name, parameters or {})

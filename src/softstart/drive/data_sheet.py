@@ -6,6 +6,7 @@ import math
 import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import cached_property
 from typing import Any, NamedTuple, Self
 
@@ -19,13 +20,14 @@ from softstart.drive.data_sheet_mechanics import (
     slope_sine,
 )
 from softstart.drive.data_sheet_values import SheetValues
-from softstart.drive.data_sheet_words import BAND, STIFFNESSES, USUAL, converted
+from softstart.drive.data_sheet_words import BAND, STIFFNESSES, USUAL, converted, usual_rotor
 from softstart.drive.model import OTHER_DOCUMENTS, Drive
 from softstart.drive.plausibility import motion_warnings, plausibility_warnings
 from softstart.errors import InputError
 from softstart.input.documents import document_text
 from softstart.input.files import file_text
-from softstart.input.parameters import Mistake, Wording, bare
+from softstart.input.parameters import Mistake, Parameter, Wording, bare, read_value
+from softstart.quantities import RefusedError
 
 _IN_SI = re.compile(r" or as a bare number in \S+(?=[.;])")  # refused, or in another unit
 # how an assumption begins, and the parameters of the drive that, where they are set themselves, leave nothing
@@ -166,14 +168,23 @@ class DataSheet(SheetValues):
         share = bare(given.get("efficiency"))
         per_cent = share and 10.0 <= float(share) <= 100.0
         vars(self)["_read"] = {"read": f"efficiency {share} is {share} %"} if per_cent else {}
-        given = {name: converted(name, value) for name, value in given.items()}
-        given |= {"efficiency": f"{share} %"} if per_cent else {}
+        read, mistakes, of = dict(given), list(mistakes), self.PARAMETERS
+        for name, value in given.items():
+            try:
+                read[name] = converted(name, value)
+            except RefusedError as refusal:
+                read[name] = 1.0  # for what else is wrong
+                mistakes.append(Mistake(wording.refused(of[name], value, refusal)))
+        given = read | ({"efficiency": f"{share} %"} if per_cent else {})
         try:
             super()._fill(given, wording, mistakes, *known)
         except InputError as error:
             if wording.style != "toml":
                 raise
-            raise InputError(_IN_SI.sub("", one) for one in error.sentences) from None
+            missing, usual = f"{of['motor_inertia'].place} is missing", _rotor(of, given)
+            raise InputError(
+                _IN_SI.sub("", one) + usual * (missing in one) for one in error.sentences
+            ) from None
 
     def _check(self, values: Mapping[str, Any], wording: Wording) -> Iterator[str]:
         given, of = vars(self)["_given"], self.PARAMETERS
@@ -262,7 +273,19 @@ class DataSheet(SheetValues):
             return Drive._made(values, Wording("the drive that follows", style="toml"), [])
         except InputError as error:
             cause = " Is [gear] ratio inverted (turns of the motor for one of the output), or a power in W?"
+            if "ratio" not in self.given():
+                cause = " Is [gear] ratio missing, or a power in W?"
             raise InputError([one + cause * ("cannot move" in one) for one in error.sentences]) from None
+
+
+def _rotor(of: Mapping[str, Parameter], given: Mapping[str, object]) -> str:
+    """What is usual for a rotor whose inertia nobody knows; "" where its rated torque is not known either."""
+    with suppress(RefusedError, KeyError):
+        if "rated_torque" in given:
+            return usual_rotor(read_value(of["rated_torque"], given["rated_torque"]))
+        power, speed = (read_value(of[name], given[name]) for name in ("rated_power", "rated_speed"))
+        return usual_rotor(power / speed)
+    return ""
 
 
 OTHER_DOCUMENTS.append(

@@ -31,6 +31,8 @@ class SheetValues(ParameterFile):
     name: str = parameter("name", "", "name of the drive", '"hoist A"', "one line", default="unnamed drive")
     source: str = parameter("source", "", "where the numbers are from", '"motor plate"', "one line",
         default="data sheets")
+    units: str = parameter("units", "", "units and shaft in which results are shown",
+        '"arcmin, rpm, kN m, at output"', "one line", default="")
     machine: MachineKind = parameter("load.machine", "", "kind of the machine", '"travel"',
         choices=get_args(MachineKind))
     rated_power: MaybeNumber = parameter("motor.rated_power", "W", "rated power", '"3 kW"', "above 0",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Literal
 
 from softstart.input.parameters import Parameter, bare, read_value
@@ -86,11 +87,20 @@ def converted(name: str, value: object) -> object:
     (2.0, 'travel', '6 t')
     >>> converted("slope", "100 %")  # 45 degrees
     '0.7853981633974483 rad'
+    >>> converted("ratio", "1:31.5")
+    Traceback (most recent call last):
+    softstart.quantities.RefusedError: the ratio counts turns of the motor for one of the output; write ...
     """
     text = str(value).strip()
     quotient = _QUOTIENT.fullmatch(text) if name in ("ratio", "reeving") else None
     if quotient and float(quotient[2]):
-        return float(quotient[1]) / float(quotient[2])
+        first, second = float(quotient[1]), float(quotient[2])
+        if name == "ratio" and first < second:
+            raise RefusedError(
+                f"the ratio counts turns of the motor for one of the output; write {second / first:.9g}, or "
+                f"{first / second:.9g} if the gear speeds the load up"
+            )
+        return first / second
     if name == "slope" and text.endswith("%") and (share := bare(text[:-1])):
         return f"{math.atan(float(share) / 100.0)!r} rad"
     if name == "machine" and value not in MACHINES:
@@ -100,6 +110,17 @@ def converted(name: str, value: object) -> object:
     return value
 
 
+def usual_rotor(rated_torque: float) -> str:
+    """A sentence on the inertia of the rotors of standard motors with four poles, as catalogues list them.
+
+    >>> usual_rotor(97.8)
+    ' Standard motors of 97.8 N*m have about 0.05 to 0.2 kg*m^2.'
+    """
+    middle = 1.6e-4 * rated_torque**1.4  # within a factor of two from 0.75 to 110 kW
+    low, high = (float(f"{share * middle:.1g}") for share in (0.5, 2.0))
+    return f" Standard motors of {rated_torque:.3g} N*m have about {low:g} to {high:g} kg*m^2."
+
+
 def typed(p: Parameter, text: str) -> str:
     """What is typed at a prompt or in a form for one parameter: a bare number has its usual unit.
 
@@ -107,7 +128,10 @@ def typed(p: Parameter, text: str) -> str:
     >>> [typed(DataSheet.PARAMETERS[name], "95") for name in ("backlash", "mass", "efficiency", "ratio")]
     ['95 arcmin', '95 kg', '95 %', '95']
     """
-    text = text.strip() if p.name == "slope" else str(converted(p.name, text))
+    text = text.strip()
+    if p.name != "slope":
+        with suppress(RefusedError):  # refused where it is read
+            text = str(converted(p.name, text))
     number, unit = bare(text), USUAL.get(p.name, p.unit)
     if p.name == "efficiency" and number and float(number) >= 10.0:
         unit = "%"

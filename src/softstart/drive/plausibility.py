@@ -65,7 +65,7 @@ def motion_warnings(
             f"mean acceleration {acceleration:.4g} m/s^2 needs {needed:.3g} of the weight as friction at the "
             f"wheels if all of them are driven, {2.0 * needed:.3g} if half of them are, where steel wheels "
             f"transmit {ADHESION[0]:g} to {ADHESION[1]:g}: they slip, or the diameter was written as radius, "
-            "or the torque is higher than the inverter will give?"
+            "t as kg, or the torque is higher than the inverter will give?"
         )
 
 
@@ -96,8 +96,8 @@ def _doubts(of: TwoMasses) -> Iterator[str]:
     if not math.isnan(J2 / J1) and not 0.01 <= J2 / J1 <= 100.0:
         yield (
             f"inertia of the load {J2 / J1:.4g} times that of the motor, where drives have 0.01 to 100 "
-            "times: not at the motor shaft (divided by the ratio squared), the ratio inverted, or kg cm2 "
-            "or g m2 written as kg m2?"
+            "times: not at the motor shaft (divided by the ratio squared), the ratio inverted, a diameter "
+            "written as radius, or kg cm2 or g m2 written as kg m2?"
         )
     if of.ratio < 1.0 and J2 > J1:
         yield (

@@ -64,6 +64,7 @@ class DataSheetPanel:
                 "another one. What is not known stays empty: below it stands what is used then; * is needed."
             )
             tables = {table.name: table.parameters for table in DataSheet.TABLES}
+            tables[""] = tuple(p for p in tables[""] if p.name != "units")  # those of the page
             for name, title in {"": "", **TITLES}.items():
                 if title:
                     ui.html(title, tag="h3", sanitize=False).classes("panel-title")
@@ -91,7 +92,7 @@ class DataSheetPanel:
         machine = str(self._fields["machine"].value)
         written = {
             p.path: text
-            for p in DataSheet.PARAMETERS.values()
+            for p in map(DataSheet.PARAMETERS.__getitem__, self._fields)
             if machine in ABOUT.get(p.name, (machine,))
             and (text := typed(p, str(self._fields[p.name].value)))
         }

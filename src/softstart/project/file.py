@@ -9,7 +9,8 @@ import base64
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -167,7 +168,10 @@ class Project(ParameterFile):
     def read(cls, text: str, where: str = "", folder: Path = Path()) -> Self:
         """From a TOML text; all mistakes at once."""
         before = f"{where}: " if where else ""
-        document = parsed(text, Wording(where, style="toml"), cls.WHAT)
+        cut_off = text.startswith(FIRST.rstrip()) and not text.rstrip().endswith(LAST.rstrip())
+        document: Mapping[str, Any] = {}
+        with suppress(InputError) if cut_off else nullcontext():  # half a line is no TOML
+            document = parsed(text, Wording(where, style="toml"), cls.WHAT)
         if {"motor", "mass"} & document.keys():
             makes = '"softstart project new job.toml FILE" makes a project of it'
             raise InputError(f"{before}this is a machine, not a project; {makes}.")
@@ -177,7 +181,7 @@ class Project(ParameterFile):
                 f"{before}version = {show(version)}: this project was written by a later softstart, and this "
                 f"one reads version {VERSION}; install that softstart. The file is unchanged."
             )
-        if text.startswith(FIRST.rstrip()) and not text.rstrip().endswith(LAST.rstrip()):
+        if cut_off:
             last = show(text.rstrip().rpartition("\n")[2][:40])
             reason = "the file is cut off, as its last line is not that of a project"
             raise InputError(f"{before}last line {last}: {reason}; take a copy of it that is whole.")

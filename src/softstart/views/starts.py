@@ -362,13 +362,15 @@ def both_ends(comparison: Comparison) -> list[str]:
     """How the choice differs between both ends of an unknown stiffness; nothing where it is known."""
     if comparison.soft_end is None:
         return []
-    stiff, soft = comparison.at_this_end, comparison.soft_end.recommendation
-    same = [row.name for row in stiff.shown] == [row.name for row in soft.shown]
+    both, stiff = comparison.recommendation, comparison.at_this_end
+    soft = comparison.soft_end.recommendation
+    same = len({tuple(row.name for row in choice.shown) for choice in (both, stiff, soft)}) == 1
     return [
         NO_STIFFNESS,
         Sentence(
-            f"At {BAND[1]:g} Hz: {_chosen(stiff)}. At {BAND[0]:g} Hz, and set up for it: {_chosen(soft)}. "
-            f"The choice {'is the same at both ends' if same else 'depends on the stiffness'}.",
+            f"For both ends: {_chosen(both)}. If it were known to be at {BAND[1]:g} Hz: {_chosen(stiff)}; at "
+            f"{BAND[0]:g} Hz, and set up for it: {_chosen(soft)}. "
+            f"The choice {'is the same in all cases' if same else 'depends on the stiffness'}.",
             "Give shaft.elastic_frequency, from the oscillation of the speed in a log, or a stiffness.",
         ),
     ]

@@ -209,6 +209,8 @@ def test_a_profile_of_an_optimum_is_played_to_the_same_k_dyn(place, done, as_jso
             "simulate", "best/drive.toml", "--controller", "profile", "--param", f"file=best/{name}"
         )
         assert played["k_dyn"] == pytest.approx(float(row["k_dyn"]), rel=1e-9)
+    compared = as_json("compare", "best/drive.toml", "--controllers", "direct,best/profile.csv")
+    assert {one["controller"]: one["k_dyn"] for one in compared["strategies"]}["profile"] == played["k_dyn"]
 
 
 def test_tuned_gains_play(place, as_json):

@@ -123,7 +123,7 @@ def test_what_contradicts_is_asked_again_and_nothing_is_lost(run, typed):
     """A ratio turned round: the drive cannot move; the sentence names the ratio, which is asked again."""
     typed(*ANSWERS)
     right = run("init", "--ask").out
-    inverted = [*ANSWERS[:14], "1:31.5", *ANSWERS[15:]]
+    inverted = [*ANSWERS[:14], "0.0317", *ANSWERS[15:]]
     typed(*inverted)
     code, out, said = run("init", "--ask")
     assert (code, out) == (2, "")
@@ -246,8 +246,9 @@ def test_a_machine_is_the_same_by_every_way_in(run, monkeypatch, place, typed, b
 
     with Client(page("/never-opened")) as client:
         panel = DataSheetPanel(Session(controllers=["direct"]), "A")
-        for name, p in DataSheet.PARAMETERS.items():
-            panel._fields[name].value = sheet.machine if p.choices else typed.get(p.path, "")
+        for name, field in panel._fields.items():
+            p = DataSheet.PARAMETERS[name]
+            field.value = sheet.machine if p.choices else typed.get(p.path, "")
         (place / "form.toml").write_text(panel.sheet().drive_toml())
         client.delete()
     drives = {name: Drive.load(f"{name}.toml") for name in ("asked", "set", "sheet", "form")}
@@ -310,7 +311,7 @@ def test_an_unknown_stiffness_is_compared_at_both_ends(run, also):
     compare = ("compare", "sheet.toml", "--controllers", "direct")
     code, out, _ = run(*compare)
     assert (code, "No stiffness is known." in out) == (0, True)
-    assert "At 30 Hz: Pareto-optimal direct" in " ".join(out.split())
+    assert "known to be at 30 Hz: Pareto-optimal direct" in " ".join(out.split())
     out = run(*compare, "--set", also).out
     assert "stiffness is known" not in out
     assert "elastic frequency" not in out
@@ -321,7 +322,8 @@ def test_an_unknown_stiffness_is_compared_at_both_ends(run, also):
 def test_init_says_how_the_choice_depends_on_an_unknown_stiffness(run):
     code, out, err = run("init", "sheet.toml", "--out", "mine.toml")
     assert code == 0
-    assert "softstart: At 30 Hz: Pareto-optimal" in err
+    assert "softstart: For both ends: Pareto-optimal" in err
+    assert "mine.toml is written: load " in out
     assert "What next: softstart compare sheet.toml" in " ".join(out.split())  # which has both ends
     assert Drive.load("mine.toml").assumed.startswith("elastic frequency 30 Hz")
 

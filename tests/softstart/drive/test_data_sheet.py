@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart import DataSheet, Drive, InputError
+from softstart.drive.data_sheet_words import usual_rotor
 
 GANTRY = {
     "load.machine": "travel", "motor.rated_power": "3 kW", "motor.rated_speed": "1430 rpm",
@@ -178,6 +179,23 @@ def test_a_file_and_back(tmp_path):
     assert Drive.load(tmp_path / "sheet.toml") == sheet.drive
 
 
+def test_a_sheet_names_the_units_of_its_drive():
+    text = "arcmin, rpm, kN m, at output"
+    sheet = DataSheet.from_settings(GANTRY | {"units": text})
+    assert sheet.drive.units == text
+    assert Drive.from_toml(sheet.drive_toml()).units == text
+    assert DataSheet.from_settings(GANTRY).drive.units == ""
+
+
+@pytest.mark.parametrize("name", ["conveyor-11kw", "hoist-15kw", "long-travel-3kw"])
+def test_the_rotors_of_shipped_motors_are_usual(name):
+    """Motors with four poles, of catalogues: what is said where an inertia is missing covers them."""
+    drive = Drive.load(name)
+    torque = drive.rated_torque or drive.rated_power / drive.rated_speed
+    low, high = map(float, re.findall(r"about (\S+) to (\S+) kg", usual_rotor(torque))[0])
+    assert low <= drive.motor_inertia <= high
+
+
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
@@ -191,7 +209,13 @@ def test_a_file_and_back(tmp_path):
         (HOIST | ROPE | {"rope.stiffness": 8e5}, "both say how stiff the rope is"),
         ({"coupling.diameter": None}, "[coupling] play says nothing without [coupling] diameter"),
         ({"load.radius": None}, "[load] diameter is missing: a travel needs the diameter of wheel or drum"),
-        ({"gear.ratio": "1:31.5"}, "raise the one or lower the other. Is [gear] ratio inverted (turns of"),
+        ({"gear.ratio": "1:31.5"}, "write 31.5, or 0.0317460317 if the gear speeds the load up."),
+        ({"gear.ratio": 0.03}, "raise the one or lower the other. Is [gear] ratio inverted (turns of"),
+        ({"gear.ratio": None}, "raise the one or lower the other. Is [gear] ratio missing, or a power"),
+        ({"gear.backlash": "8 min"}, 'min is a time, not an angle; write "8 arcmin" if that is meant.'),
+        ({"motor.inertia": None}, "Standard motors of 20 N*m have about 0.005 to 0.02 kg*m^2."),
+        ({"motor.inertia": None, "motor.rated_torque": 98}, "of 98 N*m have about 0.05 to 0.2 kg*m^2."),
+        ({"units": "furlongs"}, "the drive that follows: units"),
         (
             {"gear.efficiency": "0.95 %"},
             "is read as 0.0095, where the efficiency of all gears is 0.1 or more",

@@ -180,6 +180,7 @@ def test_a_truncated_file_is_refused_and_a_file_is_never_half_written(tmp_path: 
             Project.open(path)
         assert len(refused.value.sentences) == 1
         assert str(path) in str(refused.value)
+        assert "the file is cut off" in str(refused.value)  # not that half a line is no TOML
         assert path.read_text(encoding="utf-8") == text[:end]
     path.write_text(text, encoding="utf-8")
     with pytest.raises(InputError):
