@@ -9,7 +9,7 @@
 #   make fuzz                  the property tests with newly drawn examples (the suite always draws the same)
 #   make page                  tests of the page in a real browser (needs chromium); ONLY='-m alone': its speed
 #   make export-test           exports by a C compiler, FMU simulator and parser; ONLY='-m slow': Arm in emulation
-#   make pictures              the pictures of the README (needs chromium)
+#   make pictures              the pictures of README and documentation (needs chromium)
 #   make floors                a hundred tests on the oldest libraries that pyproject.toml allows
 #   make pythons               every library has a wheel for each Python that softstart supports
 #   make docs                  the documentation, warnings are errors; GALLERY=0: without running its examples

@@ -1,4 +1,4 @@
-"""The two pictures of the README: `make pictures` writes them to docs/_static."""
+"""The pictures of the README and the documentation: `make pictures` writes them to docs/_static."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ def taken(part: Any, path: Path) -> int:
     return path.stat().st_size
 
 
-def test_the_page_for_the_readme(visit: Any, tmp_path: Path) -> None:
-    page = visit(width=1320, height=780)
+@pytest.mark.parametrize(("dark", "name"), [(False, "page.png"), (True, "page-dark.png")])
+def test_the_page(dark: bool, name: str, visit: Any, tmp_path: Path) -> None:
+    page = visit(width=1320, height=780, dark=dark)
     page.locator('tr[data-name="direct"] input[type=checkbox]').check()
     page.locator('tr[data-name="pulse-coast-hold"] input[type=radio]').check()
     page.wait_for_function("document.querySelector('#k-dyn').dataset.value < 1")
     at_rest(page)
-    assert taken(page, Path(FOLDER or tmp_path) / "page.png") < LARGEST
+    assert taken(page, Path(FOLDER or tmp_path) / name) < LARGEST
 
 
 def test_the_figure_of_the_report_for_the_readme(browser: Any, tmp_path: Path) -> None:

@@ -42,6 +42,7 @@ STRATEGIES = (
 SHAFTS = tuple(COLOURS[k] for k in (0, 2, 4, 3, 5, 7))  # of a chain; the motor has another one
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1)), (0, (3, 1)), (0, (1, 1)), (0, (8, 2)))
 GREY, SMALL = "#666666", 9.5
+MOTOR: dict[str, Any] = {"color": "#000000", "ls": DASHES[1]}  # what the motor does, as on the page
 LIMIT = "#C02822"  # red: what is permitted, as on the page
 GAP_SHADE = "#E8ECEF"
 MARKERS = "osD^vPX*<>hd"

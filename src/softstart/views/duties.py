@@ -18,16 +18,15 @@ from softstart.start.duty_comparison import DutyComparison, DutyRow
 from softstart.start.duty_life import SECONDS_PER_HOUR, DutyLife, ShaftLife
 from softstart.start.recommendation import Margin
 from softstart.views.drawing import (
-    COLOURS,
     DASHES,
     GREY,
     LIMIT,
+    MOTOR,
     drawing,
     entitle,
     head,
     heat_map,
     legend_beside,
-    line_of,
     new_figure,
 )
 from softstart.views.fatigue import SPECTRUM, estimated_damping, slope_sentence
@@ -45,7 +44,7 @@ from softstart.views.numbers import (
 )
 from softstart.views.sheet import Sheet, Writer, columns_file, rows_file
 from softstart.views.starts import machine_lines, parameters_of
-from softstart.views.traces import shafts_of
+from softstart.views.traces import masses_of, shafts_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -518,7 +517,7 @@ def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math
     """Motor and shaft torques, and the permissible ones."""
     units = units_of(run.drive)
     t, traces = traces_between(run, begin, end)
-    axes.plot(t, units.shown(traces["u"], "N*m"), color=COLOURS[1], lw=0.8, label="motor torque u")
+    axes.plot(t, units.shown(traces["u"], "N*m"), lw=0.8, label="motor torque u", **MOTOR)
     for (name, line), torque in zip(shafts_of(run), traces["T"].T, strict=True):
         axes.plot(t, units.shown(torque, "N*m"), label=name, **(line | {"lw": 0.9}))
     permissible = float(run.drive.permissible_torques[int(run.worst.peak_torques.argmax())])
@@ -531,12 +530,9 @@ def draw_torques(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math
 
 def draw_speeds(axes: Axes, run: DutyRun, begin: float = 0.0, end: float = math.inf) -> None:
     """The speeds of all masses."""
-    units, names = units_of(run.drive), run.drive.mass_names
+    units = units_of(run.drive)
     t, traces = traces_between(run, begin, end)
-    lines = [(name, line_of(i)) for i, name in enumerate(names)]
-    if len(lines) == 2:
-        lines = [("motor w1", {"color": COLOURS[1]}), ("load w2", {"color": COLOURS[0]})]
-    for (name, line), speed in zip(lines, traces["w"].T, strict=True):
+    for (name, line), speed in zip(masses_of(run), traces["w"].T, strict=True):
         axes.plot(t, units.shown(speed, "rad/s"), label=name, **(line | {"lw": 0.9}))
     head(axes, "", f"speed, {units.of('rad/s')}")
 

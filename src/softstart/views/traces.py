@@ -16,6 +16,7 @@ from softstart.views.drawing import (
     DASHES,
     GREY,
     LIMIT,
+    MOTOR,
     SHAFTS,
     drawing,
     entitle,
@@ -75,15 +76,30 @@ def run_figure(run: Run) -> Figure:
 def torques(axes: Axes, run: Run) -> None:
     """Motor and shaft torques, and the permissible one."""
     units = units_of(run.drive)
-    axes.plot(run.t, units.shown(run.u, "N*m"), color=COLOURS[1], ls=DASHES[1], label="motor torque u")
+    axes.plot(run.t, units.shown(run.u, "N*m"), lw=1.0, label="motor torque u", **MOTOR)
     shaft_torques(axes, run)
     head(axes, f"K_dyn = {run.k_dyn:.3f}", f"torque, {units.label('N*m')}")
 
 
 def shafts_of(run: Run | DutyRun) -> list[tuple[str, dict[str, Any]]]:
-    """Name and line of each shaft."""
-    names = run.drive.shaft_names if len(run.drive.shaft_names) > 1 else ("shaft torque T",)
+    """Name and line of each shaft, a single one in the colour of the strategy."""
+    names = run.drive.shaft_names
+    if len(names) == 1:
+        return [("shaft torque T", {"color": colour_of(run)})]
     return [(name, line_of(k) | {"color": SHAFTS[k % len(SHAFTS)]}) for k, name in enumerate(names)]
+
+
+def masses_of(run: Run | DutyRun) -> list[tuple[str, dict[str, Any]]]:
+    """Name and line of each mass, the load of a motor in the colour of the strategy."""
+    names = run.drive.mass_names
+    if len(names) == 2:
+        return [("motor w1", MOTOR | {"lw": 1.0}), ("load w2", {"color": colour_of(run)})]
+    return [(name, line_of(i)) for i, name in enumerate(names)]
+
+
+def colour_of(run: Run | DutyRun) -> str:
+    """The colour of the strategy of a run."""
+    return strategy_colours([run.controller_name])[run.controller_name][0]
 
 
 def shaft_torques(axes: Axes, run: Run) -> None:
@@ -111,10 +127,7 @@ def permissible_line(axes: Axes, run: Run) -> None:
 def speeds(axes: Axes, run: Run) -> None:
     """The speeds of all masses, the target speed, and the end of the start."""
     machine, units = run.drive, units_of(run.drive)
-    lines = [(name, line_of(i)) for i, name in enumerate(machine.mass_names)]
-    if len(lines) == 2:
-        lines = [("motor w1", {"color": COLOURS[1], "ls": DASHES[1]}), ("load w2", {"color": COLOURS[0]})]
-    for (name, line), speed in zip(lines, run.w.T, strict=True):
+    for (name, line), speed in zip(masses_of(run), run.w.T, strict=True):
         axes.plot(run.t, units.shown(speed, "rad/s"), label=name, **line)
     if machine.target_speed is not None:
         target = float(units.shown(machine.target_speed, "rad/s"))
@@ -130,7 +143,7 @@ def twists(axes: Axes, run: Run) -> None:
     """The twist of a single shaft as an angle, of several each in its gap."""
     gaps, units = run.drive.gaps, units_of(run.drive)
     if len(gaps) == 1:
-        axes.plot(run.t, units.shown(run.twist[:, 0], "rad"), color=COLOURS[2])
+        axes.plot(run.t, units.shown(run.twist[:, 0], "rad"), color=colour_of(run))
         flanks, title, unit = float(units.shown(0.5 * gaps[0], "rad")), "phi1 - phi2", units.of("rad")
     else:
         for (name, line), gap, twist in zip(shafts_of(run), gaps, run.twist.T, strict=True):
@@ -154,6 +167,8 @@ def shown_until(rows: Sequence[Row]) -> float:
 
 def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
     """Torques of several starts in small panels of one scale; grey where the gap is open."""
+    from matplotlib.lines import Line2D
+
     runs, latest = [row.run for row in rows], shown_until(rows)
     units = units_of(runs[0].drive)
     lowest = min(float(min(run.T.min(), run.u.min())) for run in runs)
@@ -164,7 +179,7 @@ def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
             if len(run.drive.shaft_names) == 1:
                 shade_open_gap(panel, run, latest)
             torque = units.shown(run.u, "N*m")
-            panel.plot(run.t, torque, color=COLOURS[1], ls=DASHES[1], lw=0.9, label="motor torque u")
+            panel.plot(run.t, torque, lw=0.7, label="motor torque u", **MOTOR)
             shaft_torques(panel, run)
             panel.set_title(f"{verbatim(row.name)}: {run.k_dyn:.3f}", loc="left", pad=3, fontsize=8.0)
             if not math.isnan(run.shown.limited_time):
@@ -172,8 +187,10 @@ def comparison_figure(rows: Sequence[Row], title: str = "") -> Figure:
         axes[0].set_xlim(0.0, latest)
         ends = np.array([min(-0.06 * highest, 1.06 * lowest), 1.12 * highest])
         axes[0].set_ylim(units.shown(ends, "N*m"))
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles[:FEW], labels[:FEW], loc="outside lower center", ncols=4)
+        lines = axes[0].get_legend_handles_labels()[0][:FEW]
+        if len(runs[0].drive.shaft_names) == 1:  # each panel has a colour of its own
+            lines[1] = Line2D([], [], color=GREY, label="shaft torque T")
+        figure.legend(handles=lines, loc="outside lower center", ncols=4)
         if title:
             entitle(figure, title)
     return figure
