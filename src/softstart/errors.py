@@ -32,6 +32,10 @@ class Sentence(str):
         self.on_page = f"{fact} {advice if page is None else page}".strip()
         return self
 
+    def after(self, before: str) -> Sentence:
+        """The same with a text in front."""
+        return Sentence(before + self.fact, self.advice, self.on_page.removeprefix(self.fact).strip())
+
 
 def fact_of(text: str) -> str:
     """A sentence without its advice."""

@@ -42,7 +42,7 @@ def test_an_optimum_is_that_of_optimize_and_joins_the_strategies(page: Any, tmp_
     gap = page.locator('[data-path="shaft.gap"] input[type=text]')
     gap.fill("0.7")
     gap.press("Enter")
-    changed = "For shaft.gap 0.5 rad; the drive has changed since."
+    changed = "For total gap 0.5 rad; the drive has changed since."
     comes_to(lambda: page.get_by_test_id("optimum-stale").inner_text(), changed)
     page.get_by_test_id("optimum-time").fill("soon")
     page.get_by_test_id("optimum-go").click()

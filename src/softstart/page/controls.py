@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from time import perf_counter
 
@@ -10,9 +11,10 @@ from softstart.errors import InputError
 from softstart.page import links
 from softstart.page.frames import SERVER, FrameBuilder
 from softstart.page.machines import DIGITS, NODE_DIGITS, FormField
-from softstart.page.sentences import sentence_of
+from softstart.page.sentences import field_labels, sentence_of
 from softstart.page.session import Session
 from softstart.quantities import seen_from
+from softstart.views.numbers import unit
 
 DRIFT = 2e-4  # of two clocks against one another: more than real ones have
 LARGEST = 1e15  # beyond any number of a message: clocks in ms, positions, values
@@ -93,11 +95,26 @@ class Controls:
         try:
             act(*arguments.values())
         except Exception as error:  # a drive may refuse anything
-            self._frames.mistakes[place] = sentence_of(error)
+            said = sentence_of(error, labels=self._labels(place))
+            if place:  # a number without a unit is in that of the field
+                entry = self._frames.entries[place]
+                own = unit(entry.seen(self._session.inputs.units).of(entry.unit))
+                said = re.sub(r"(?<=as a bare number in )\S+(?=\.)", own, said)
+            self._frames.mistakes[place] = said
         else:
             self._frames.mistakes.pop(place, None)
         if self._session.version == version:
             self._poke()
+
+    def _labels(self, place: str) -> dict[str, str]:
+        """What fields are called in an error message beside the field at this place, which names it first."""
+        entries, labels = self._frames.entries, field_labels(self._session.inputs.machine)
+        labels |= {path: entry.label for path, entry in entries.items() if path not in labels}
+        table = place.rpartition(".")[0]  # some messages have the key alone
+        beside = {path.rpartition(".")[2]: entry.label for path, entry in entries.items()
+                  if path.startswith(f"{table}.")}  # fmt: skip
+        own = {place: entries[place].label} if place else {"at_time": "equal time"}
+        return beside | labels | own
 
     def _entry(self, path: str) -> FormField:
         if path not in self._frames.entries:

@@ -105,9 +105,11 @@ class DutyPlan:
                 raise InputError(f'stop = "{value}": {hint}')
             return replace(self, stop=str(value or ""))
         if place == f"{PATH}.shift":
-            if value is None and key == "cycles_per_hour":
+            if value is None and (key == "cycles_per_hour" or self.shift is None):
                 return replace(self, shift=None)
-            shift = Shift(**{key: value}) if self.shift is None else self.shift.replace(**{key: value})
+            given = {} if self.shift is None else self.shift.given()
+            given = {name: one for name, one in given.items() if name != key}
+            shift = Shift(**given | ({} if value is None else {key: value}))
             return replace(self, shift=shift)
         index = int(place[len(PATH) + 1 : -1]) - 1
         self._check(index)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from softstart.page.session import DutyResult, Inputs
     from softstart.start.duty import DutyRun, StepRun
 
-PLACE = re.compile(r"\[duty\] (\d+)")  # of a step, in a sentence
+PLACE = re.compile(r"\b[Ss]tep (\d+)")  # of a step, in a sentence
 POINTS, FEWEST = 1_400, 50  # buckets of all steps together, and of one
 PER_BUCKET = 16  # instants of a bucket, of which it keeps the extrema of each channel
 NOISE = 1e-9  # of the mean torque: rounding

@@ -21,7 +21,15 @@ from softstart.page import links, machines
 from softstart.page.duty import fields_of, values_of
 from softstart.page.duty_frames import duty_view, json_number
 from softstart.page.machines import STRATEGY, Axes, FormField
-from softstart.page.sentences import Value, differences, page_sentence, sentence_of, written
+from softstart.page.sentences import (
+    Value,
+    differences,
+    field_labels,
+    in_words,
+    page_sentence,
+    sentence_of,
+    written,
+)
 from softstart.page.session import LONGEST_DUTY, EqualTime, Inputs, Reference, Session, Strategy
 from softstart.quantities import Units, seen_from
 from softstart.start.comparison import SOFT_END
@@ -30,7 +38,7 @@ from softstart.views.drawing import strategy_colours
 from softstart.views.numbers import unit
 from softstart.views.starts import NO_STIFFNESS, position_notes
 
-AS_SET_HERE = "Strategies count as they are set here; softstart compare also sets them for the limits."
+AS_SET_HERE = "Strategies count as they are set here; the report also sets them for the limits."
 QUICK_EVENTS = 8_000  # of a start while a slider is dragged; longer ones are computed after it
 QUICK = 0.010  # s, of a start that is computed at every step of a slider, even if no frame follows
 LONG = (math.inf, math.inf)
@@ -156,7 +164,7 @@ class FrameBuilder:
             "inertia": 1.0 / units.shown(1.0, "kg*m^2"),
             "torque": unit(units.of("N*m")),
             "at": units.at,
-            "no_output": gear
+            "no_output": in_words(gear, field_labels(inputs.machine))
             if isinstance(gear := inputs.machine.gear or inputs.machine.gear_with(), str)
             else "",
             "map_is_old": not self._map_is_right(),
@@ -306,7 +314,9 @@ class FrameBuilder:
             "rows": [row(session, result) for result in session.strategies],
             "recommendation": " ".join(advice),
             "recommended": recommended.name if (recommended := recommendation.recommended) else "",
-            "plausibility_warnings": plausibility_warnings(inputs.machine),
+            "plausibility_warnings": [
+                in_words(one, field_labels(inputs.machine)) for one in plausibility_warnings(inputs.machine)
+            ],
             "assumed": [text for text in inputs.machine.assumed.split("; ") if text],
         }
         if self.duty_shown:
@@ -506,7 +516,7 @@ def reference_words(reference: Reference, inputs: Inputs) -> tuple[str, ...]:
     >>> session.set("gap", 1.0)
     >>> session.set_parameter("time", "200 ms")
     >>> reference_words(session.inputs.reference, session.inputs)
-    ('ramp', 'time default', 'shaft.gap 0.5 rad')
+    ('ramp', 'time default', 'total gap 0.5 rad')
     """
     controller, now = reference.controller, inputs.controllers.get(reference.label)
     words = [

@@ -168,7 +168,7 @@ def parameter_fields(machine: Machine) -> Mapping[str, FormField]:
                 path, group, parameter.label,
                 f"{symbol}{k if k and symbol else ''}".translate(BELOW), si,
                 f"{parameter.meaning}; write for example {', '.join([*words, example])}", example,
-                () if si else choices, words, parameter.default is None,
+                () if si else choices, words, parameter.default is None and key != "gap",
                 _scale(word, value, machine, model, k), parameter.at_output,
             )  # fmt: skip
     return entries

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from nicegui import ui
 
 from softstart.controller.finding import controller_class
@@ -16,7 +18,7 @@ from softstart.page.panel_parts import TERMINALS, choice, text_field, upload
 from softstart.plugins import controller_names
 from softstart.quantities import values_in
 from softstart.tuning.problem import gaps_of, inertias_of
-from softstart.views.numbers import units_of
+from softstart.views.numbers import unit, units_of
 
 SEARCHES = {"1": "one search, quick", "3": "three searches", "6": "six searches, thorough"}
 MOST_CELLS = 60
@@ -174,7 +176,12 @@ def grid_of(drive: Machine, gaps: str, inertias: str) -> tuple[list[float], list
         with mistakes.collect():
             typed = [units.typed(value, si) for value in values_in(text, name)]
             values.append(list(read(drive, typed, name)))
-    mistakes.raise_if_any()
+    if mistakes.sentences:
+        own = unit(units.of("rad"))
+        texts = [re.sub(r": (gap|load_inertia) = ", " = ", one) for one in mistakes.sentences]
+        raise InputError(
+            [one.replace("as a bare number in rad.", f"as a bare number in {own}.") for one in texts]
+        )
     cells = len(values[0]) * len(values[1])
     if cells > MOST_CELLS:
         raise InputError(

@@ -23,10 +23,12 @@ INTERNAL_ERROR = "Internal error in softstart, not caused by your input ({})."
 FAILED_START = "The start was aborted: the strategy failed on this drive ({})."
 
 
-def sentence_of(error: BaseException, otherwise: str = INTERNAL_ERROR) -> str:
+def sentence_of(
+    error: BaseException, otherwise: str = INTERNAL_ERROR, labels: Mapping[str, str] | None = None
+) -> str:
     """One plain sentence for an exception: nobody who uses the page sees a traceback.
 
-    `otherwise` is the sentence for an exception that has none of its own.
+    `otherwise` is the sentence for an exception that has none of its own; `labels` of fields stand for keys.
 
     >>> sentence_of(InputError(["gap = -1: a gap is 0 or more.", "inertia = 0: above 0."]))
     'gap = -1: a gap is 0 or more. inertia = 0: above 0.'
@@ -34,7 +36,8 @@ def sentence_of(error: BaseException, otherwise: str = INTERNAL_ERROR) -> str:
     "Internal error in softstart, not caused by your input (KeyError: 'x')."
     """
     if isinstance(error, InputError):
-        return " ".join(map(page_sentence, error.sentences))
+        texts = map(page_sentence, error.sentences)
+        return " ".join(texts if labels is None else (in_words(one, labels) for one in texts))
     if isinstance(error, SimulationError):
         return page_sentence(" ".join(str(error).split()))
     if isinstance(error, MemoryError):
@@ -57,21 +60,54 @@ def page_sentence(sentence: str) -> str:
 
 
 def in_words(sentence: str, labels: Mapping[str, str]) -> str:
-    """A sentence with the labels of fields, by path, in place of keys.
+    """A sentence with the labels of fields in place of keys: by path, or by a key that begins the sentence.
 
-    >>> labels = {"motor.rated_speed": "rated speed", "gear.ratio": "turns of the motor"}
+    >>> labels = {"motor.rated_speed": "rated speed", "mass[2].inertia": "inertia of fan", "time": "rise"}
     >>> in_words('[motor] rated_speed = "fast": this is not a number with a unit.', labels)
     'Rated speed "fast": this is not a number with a unit.'
-    >>> in_words('gear.ratio is missing: it is needed; write for example ratio = 31.5.', labels)
-    'Turns of the motor is missing: it is needed; write for example 31.5.'
+    >>> in_words("[mass] 2, inertia is missing: it is needed; write for example inertia = 0.5.", labels)
+    'Inertia of fan is missing: it is needed; write for example 0.5.'
+    >>> in_words("time = -1: above motor.rated_speed = 3.", labels)
+    'Rise -1: above rated speed 3.'
+    >>> in_words('[duty] 2, do = "stop": the machine stands.', {})
+    'Step 2, stop: the machine stands.'
     """
 
     def label(found: re.Match[str]) -> str:
-        return labels.get(found[3] or f"{found[1]}.{found[2]}", found[0])
+        table, number, key, path = found.groups()
+        named = path or (f"{table}[{number}].{key}" if number else f"{table}.{key}")
+        return labels.get(named, f"step {number}, {key}" if table == "duty" and number else found[0])
 
-    text = re.sub(r"(?:\[(\w+)\] (\w+)|((?:\w+(?:\[\d+\])?\.)+\w+))(?: =)?", label, sentence)
-    text = re.sub(r'write for example [\w.]+ = "?([^"]*)"?\.$', r"write for example \1.", text)
+    text = re.sub(r'(\[duty\] \d+, )do = "(\w+)"', r"\1\2", sentence)
+    pattern = r"(?:\[(\w+)\] (?:(\d+), )?(\w+)|(\w+(?:\[\d+\])?(?:\.\w+)+))(?: =)?"
+    text = re.sub(r"^(\w+)(?: =)?(?=[ :])", lambda found: labels.get(found[1], found[0]), text)
+    text = re.sub(pattern, label, text)
+    text = re.sub(r'write for example [\w.]+ ?= ?"?([^"]*)"?\.$', r"write for example \1.", text)
     return text[:1].upper() + text[1:]
+
+
+def field_labels(machine: Machine) -> dict[str, str]:
+    """What the fields of a machine are called, by path; with their part where others are called alike.
+
+    >>> from softstart import Chain, Drive
+    >>> labels = field_labels(Drive.load("crane-4amtkf"))
+    >>> [labels[path] for path in ("load.inertia", "shaft.gap", "limits.shaft_torque")]
+    ['load inertia', 'total gap', 'shaft torque (limits)']
+    >>> field_labels(Chain.load("crane-4-mass"))["mass[2].inertia"]
+    'inertia of pinion'
+    """
+    labels = {}
+    for path, (parameter, _) in machine.parameters_by_path().items():
+        table, _, number = path.partition("]")[0].partition("[")
+        labels[path] = parameter.label
+        if number:
+            names = machine.mass_names if table == "mass" else machine.shaft_names
+            labels[path] += f" of {names[int(number) - 1]}"
+        elif path.startswith("limits."):
+            labels[path] += " (limits)"
+        elif parameter.table in ("motor", "load", "gear", "brake"):
+            labels[path] = f"{parameter.table} {parameter.label}"
+    return labels
 
 
 def changed_since(computed: Machine, now: Machine) -> str:
@@ -84,7 +120,7 @@ def changed_since(computed: Machine, now: Machine) -> str:
     >>> changed_since(crane, crane.replace(name="the same by another name"))
     ''
     >>> changed_since(crane, crane.replace(gap=1.0))
-    'For shaft.gap 0.5 rad; the drive has changed since.'
+    'For total gap 0.5 rad; the drive has changed since.'
     """
     named = differences(computed, now)
     if not named:
@@ -99,13 +135,14 @@ def differences(machine: Machine, other: Machine) -> str:
     >>> from softstart import Drive
     >>> crane = Drive.load("crane-4amtkf")
     >>> differences(crane.replace(gap=1.0, load_inertia=0.2), crane)
-    'shaft.gap 1 rad, load.inertia 0.2 kg m\N{SUPERSCRIPT TWO}'
+    'total gap 1 rad, load inertia 0.2 kg m\N{SUPERSCRIPT TWO}'
     """
     different = [change for change in changes(machine, other) if change.parameter.name not in WORDS]
     if different and machine.name != other.name:
         return cut(machine.name)
     units = units_of(other)
-    values = [f"{change.path} {_value(change, units)}" for change in different[:NAMED]]
+    labels = field_labels(other) | field_labels(machine)
+    values = [f"{labels[change.path]} {_value(change, units)}" for change in different[:NAMED]]
     return ", ".join(values) + (f" and {len(different) - NAMED} more" if len(different) > NAMED else "")
 
 

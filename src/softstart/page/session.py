@@ -23,8 +23,9 @@ from softstart.errors import InputError, SimulationError
 from softstart.hints import nearest
 from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
 from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
-from softstart.page.sentences import FAILED_START, sentence_of
+from softstart.page.sentences import FAILED_START, field_labels, sentence_of
 from softstart.project import Project, StoredOptimum
+from softstart.project.parts import refuse_longer
 from softstart.quantities import Units, seen_from
 from softstart.start.comparison import (
     REFERENCE,
@@ -56,7 +57,7 @@ MAX_EVENTS_SET = 2_000  # of a start whose strategy is set for equal time: that 
 LONGEST_TIME = 40  # characters
 LONGEST_DUTY, OTHER_DUTY = 3.0, 0.5  # s of computation under the selected strategy, and any other one
 TOO_LONG_DUTY = (
-    "The duty takes too long to be carried out while you wait; use softstart duty, or less repetitions."
+    "The duty takes too long to be carried out while you wait; give fewer repetitions or shorter steps."
 )
 MAX_EVENTS = 200_000  # of one start on the page, some tenths of a second; the command line allows a million
 
@@ -226,6 +227,11 @@ class Inputs:
         )
 
     @property
+    def claimed(self) -> frozenset[str]:
+        """Labels of optima: computed here, or of the project."""
+        return frozenset((*self.optima, *(one.name for one in self.project.optima)))
+
+    @property
     def drawn(self) -> tuple[str, ...]:
         """Labels of the strategies that are drawn, in the order of the table; the selected one always is."""
         return tuple(label for label in self.controllers if label in self.visible or label == self.selected)
@@ -375,7 +381,7 @@ class Session:
         >>> session = Session("conveyor-11kw")
         >>> session.set_duty(session.inputs.plan.moved(0, 2))
         >>> session.duty_result().trouble
-        '[duty] 2, do = "stop": the machine stands; a step "start" must come before it.'
+        'Step 2, stop: the machine stands; a step "start" must come before it.'
         """
         if plan != self.inputs.plan:
             self._change(gesture, duty=plan)
@@ -603,7 +609,8 @@ class Session:
         if (known := self.ready(label)) is not None:
             return known
         machine, controller = self.inputs.machine, self.inputs.controllers[label]
-        result = _started(label, machine, controller, max_events)
+        own = label not in self._initial and label not in self.inputs.claimed
+        result = _started(label, machine, controller, max_events, whole=own)
         if not result.given_up or max_events >= MAX_EVENTS:
             self._results[label] = machine, controller, result
         return result
@@ -680,7 +687,7 @@ class Session:
         try:
             at, direct = self._equal_time(inputs.at_time)
             if run.trajectory.events.size > MAX_EVENTS_SET:
-                raise InputError(f"{label}: its starts take too long here; use softstart compare --at-time.")
+                raise InputError(f"{label}: its starts have too many events to set it for equal time here.")
             start = partial(compared, machine, direct=direct, soft=inputs.soft_drive)
             found = row_at_time(machine, controller, direct, at, None, start)
             if isinstance(found, TooSlow):
@@ -789,12 +796,18 @@ def _first_selected(labels: Iterable[str]) -> str:
     return REFERENCE if REFERENCE in labels else next(iter(labels), REFERENCE)
 
 
-def _started(label: str, machine: Machine, controller: Controller, max_events: int) -> Strategy:
+def _started(
+    label: str, machine: Machine, controller: Controller, max_events: int, whole: bool = False
+) -> Strategy:
+    """A start; if `whole`, one that ends before its profile does is refused."""
     began = time.thread_time()
     try:
         run, trouble, given_up = simulate(machine, controller, max_events=max_events), "", False
+        if whole:
+            refuse_longer(run, f'strategy "{label}"')
     except Exception as error:  # a controller is anyone's code and may fail in any way
-        run, trouble, given_up = None, sentence_of(error, FAILED_START), isinstance(error, SimulationError)
+        trouble = sentence_of(error, FAILED_START, field_labels(machine))
+        run, given_up = None, isinstance(error, SimulationError)
     return Strategy(label, run, trouble, time.thread_time() - began, given_up)
 
 
@@ -810,4 +823,4 @@ def _in_duty(machine: Machine, controller: Controller, plan: DutyPlan, seconds: 
     except TimeoutError:
         return DutyResult(None, TOO_LONG_DUTY, given_up=True)
     except Exception as error:  # a controller is anyone's code and may fail in any way
-        return DutyResult(None, sentence_of(error, FAILED_START))
+        return DutyResult(None, sentence_of(error, FAILED_START, field_labels(machine)))

@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from softstart.controller.base import Controller
-from softstart.controller.finding import ready_controller_names
+from softstart.controller.finding import controller_class, ready_controller_names
+from softstart.controller.parameters import declared_parameters
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.page.downloads import file_name, profile_file, written_text
@@ -179,7 +180,10 @@ def tuning(
         controllers[f"{controller} (robust)"] = tuned.robust.controller
     if tuned.schedule is not None:
         controllers[f"{controller} (schedule)"] = tuned.scheduled
-    return TaskResult(shown(sheet), files, controllers)
+    answer = shown(sheet)
+    for name in declared_parameters(controller_class(controller)):  # their fields have names without signs
+        answer = re.sub(rf"\b{name}\b", name.replace("_", " "), answer)
+    return TaskResult(answer, files, controllers)
 
 
 class _Throttled:

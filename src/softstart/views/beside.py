@@ -87,7 +87,8 @@ def beside_sheet(both: SideBySide) -> Sheet:
         lines,
         tables=[beside_table(both)],
         conclusions=[
-            f"{letter}: {one.recommendation.text}" for letter, one in zip(LETTERS, both.machines, strict=True)
+            one.recommendation.text.after(f"{letter}: ")
+            for letter, one in zip(LETTERS, both.machines, strict=True)
         ],
         notes=[LEGEND, *([worn] if both.worn else [])],
         figures={"beside": lambda: beside_figure(both)},

@@ -111,7 +111,7 @@ def test_fields_are_those_of_the_selected_step_in_the_units_of_the_page(page):
     ("step", "key", "text", "sentence"),
     [
         (2, "time", "0", "must be above 0"),
-        (2, "time", "", "time is missing"),
+        (2, "time", "", "Time is missing"),
         (1, "repeat", "1.5", "must be a whole number"),
         (1, "set_speed", "5 kg", "a mass, not a"),
         (3, "by", "parachute", "parachute"),

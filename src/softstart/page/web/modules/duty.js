@@ -60,7 +60,7 @@ export class Duty {
     const save = (name, text, kind) => () => this.save(name, text(), kind);
     const own = { "aria-label": null }; // its text
     this.files = [
-      button("Duty TOML", "The duty as a file: softstart duty MACHINE --duty FILE", save("duty.toml", () => this.view.toml, "application/toml"), own),
+      button("Duty TOML", "The duty as a file, which Load a file reads again", save("duty.toml", () => this.view.toml, "application/toml"), own),
       button("Steps CSV", "The table of steps as CSV", save("steps.csv", () => this.csv(), "text/csv"), own),
       button("Trace CSV", "The points that are drawn as CSV", save("duty-trace.csv", () => this.plot.csv(this.view), "text/csv"), own),
       button("PNG", "The trace as it is seen, as PNG", () => this.canvas.toBlob((blob) => this.save("duty.png", blob, "image/png")), own)];
