@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -107,7 +106,7 @@ def shaking_of_shafts(shafts: Sequence[BalancerShaft]) -> tuple[Complex, Complex
     return cleaned(force, scale), couple, moment
 
 
-class Engine(ParameterFile):
+class Engine(ParameterFile, library=LIBRARY):
     """A four-stroke engine: cylinders in one row, their masses and pressure, counterweights and shafts.
 
     Parameters
@@ -142,9 +141,6 @@ class Engine(ParameterFile):
     >>> round(engine.displacement * 1e6, 1), engine.cylinders.count
     (749.9, 2)
     """
-
-    WHAT: ClassVar[str] = "an engine"
-    LIBRARY: ClassVar[Library] = LIBRARY
 
     # fmt: off
     cylinders: Cylinders = component(Cylinders, kw_only=False)

@@ -60,7 +60,7 @@ def torque_harmonics(cycle: SimpleCycle, cylinders: Cylinders) -> Complex:
     return harmonics
 
 
-class SimpleCycle(ParameterSet, kw_only=False):
+class SimpleCycle(ParameterSet, kw_only=False, what="a cycle"):
     """Polytropic compression and expansion, heat by Vibe's law, constant pressures at intake and exhaust.
 
     - From 3 pi to the start of the combustion p V^n_c is constant.
@@ -82,7 +82,6 @@ class SimpleCycle(ParameterSet, kw_only=False):
     10.0
     """
 
-    WHAT: ClassVar[str] = "a cycle"
     USUAL: ClassVar[dict[str, str]] = {"speeds": "rpm"}
 
     compression_ratio: Number = parameter(

@@ -19,7 +19,7 @@ SAME = 1e-6  # rad: angles nearer than this are one
 HIGHEST = 24  # order of the crank speed
 
 
-class Cylinders(ParameterSet, kw_only=False):
+class Cylinders(ParameterSet, kw_only=False, what="a row of cylinders"):
     """Equal cylinders in one row. Lengths in m, angles in rad; strings with units are read.
 
     `firing_angles` are the crank angles at which each cylinder, counted along the row, is at its firing dead
@@ -32,8 +32,6 @@ class Cylinders(ParameterSet, kw_only=False):
     >>> [round(math.degrees(angle)) for angle in four.throw_angles]
     [0, 180, 180, 0]
     """
-
-    WHAT: ClassVar[str] = "a row of cylinders"
 
     bore: Number = parameter("cylinders.bore", "m", "bore", '"82 mm"', "above 0")
     stroke: Number = parameter("cylinders.stroke", "m", "stroke", '"71 mm"', "above 0")
@@ -129,13 +127,11 @@ class Cylinders(ParameterSet, kw_only=False):
         return self.area * (crank.r + crank.rod - crank.height(phi))
 
 
-class Masses(ParameterSet, kw_only=False):
+class Masses(ParameterSet, kw_only=False, what="a set of masses"):
     """Masses in kg of one cylinder; the rod is split between piston pin and crank pin.
 
     `inertia` in kg m^2 of crank and flywheel is only needed for the speed fluctuation.
     """
-
-    WHAT: ClassVar[str] = "a set of masses"
 
     reciprocating: Number = parameter(
         "masses.reciprocating", "kg", "reciprocating mass of one cylinder", '"0.68 kg"', "above 0"
@@ -149,10 +145,8 @@ class Masses(ParameterSet, kw_only=False):
     )
 
 
-class Counterweights(ParameterSet, kw_only=False):
+class Counterweights(ParameterSet, kw_only=False, what="a set of counterweights"):
     """Counterweights opposite to each throw, as shares of the masses they balance."""
-
-    WHAT: ClassVar[str] = "a set of counterweights"
 
     reciprocating_share: Number = parameter(
         "counterweights.reciprocating_share", "1",
@@ -164,10 +158,9 @@ class Counterweights(ParameterSet, kw_only=False):
     )  # fmt: skip
 
 
-class Operation(ParameterSet, kw_only=False):
+class Operation(ParameterSet, kw_only=False, what="an operation"):
     """Speed range in rad/s, load (1 is full, 0 is idling), and the speed at which a balancer is tuned."""
 
-    WHAT: ClassVar[str] = "an operation"
     USUAL: ClassVar[dict[str, str]] = dict.fromkeys(("lowest_speed", "highest_speed", "tuning_speed"), "rpm")
 
     lowest_speed: Number = parameter(
@@ -192,7 +185,7 @@ class Operation(ParameterSet, kw_only=False):
         )
 
 
-class BalancerShaft(ParameterSet, kw_only=False):
+class BalancerShaft(ParameterSet, kw_only=False, what="a balancer shaft"):
     """One balancer shaft. At crank angle phi its mass points at the angle `ratio phi + phase` from the top.
 
     `imbalance` in kg m; `ratio` a whole number, negative if it turns against the crank; `height` in m above
@@ -201,8 +194,6 @@ class BalancerShaft(ParameterSet, kw_only=False):
     >>> BalancerShaft("0.0227 kg*m", -1, phase="180 deg", height="30 mm").imbalance
     0.0227
     """
-
-    WHAT: ClassVar[str] = "a balancer shaft"
 
     imbalance: Number = parameter(
         "shaft.imbalance", "kg*m", "imbalance, mass times radius", '"0.02 kg*m"', "above 0"

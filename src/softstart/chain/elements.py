@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
-from typing import Any, ClassVar, Literal, Protocol, Self, get_args
+from typing import Any, Literal, Protocol, Self, get_args
 
 from softstart.drive import ContactLaw, Drive, LoadKind
 from softstart.input.files import Library
@@ -25,7 +25,7 @@ LIBRARY = Library("softstart.chain", "a chain", "chains")
 MOST_POINTS = 16  # of a load curve
 
 
-class Mass(ParameterSet):
+class Mass(ParameterSet, what="a mass"):
     """A rigid mass: everything in SI, on its own shaft.
 
     `torque` is the load torque, positive where it brakes a forward motion; `kind` "active" acts always,
@@ -47,8 +47,6 @@ class Mass(ParameterSet):
     0.035
     >>> fan = Mass(2.0, curve_speed=["0 rpm", "500 rpm", "1000 rpm"], curve_torque=[0.0, 10.0, 40.0])
     """
-
-    WHAT: ClassVar[str] = "a mass"
 
     # fmt: off
     name: str = parameter("mass.name", "", "name of the mass", '"drum"', default="")
@@ -103,7 +101,7 @@ class Mass(ParameterSet):
         return at, self.curve_torque, self.curve_angle is not None
 
 
-class Shaft(ParameterSet):
+class Shaft(ParameterSet, what="a shaft"):
     """What joins two neighbouring masses: a spring with a damper, a gap, then a gear.
 
     `ratio` is the speed of the mass before over that of the mass after (3 for a reduction of three to one).
@@ -127,8 +125,6 @@ class Shaft(ParameterSet):
     >>> Shaft(gap="1 deg", restitution=0.9).rigid
     True
     """
-
-    WHAT: ClassVar[str] = "a shaft"
 
     # fmt: off
     stiffness: Number = parameter("shaft.stiffness", "N*m/rad", "stiffness", '"368 N*m/rad"', "above 0",
@@ -233,7 +229,7 @@ class Shaft(ParameterSet):
         return self.replace(gap=factor * self.gap, backlash=None, diameter=None, start_position=theta)
 
 
-class Motor(ParameterSet):
+class Motor(ParameterSet, what="a motor"):
     """The motor's torque as a `Drive` has it, at the shaft of the mass on which it acts ("": the first).
 
     Attributes
@@ -245,8 +241,6 @@ class Motor(ParameterSet):
     >>> Motor(62, torque_lag="2 ms").maximum_torque
     62.0
     """
-
-    WHAT: ClassVar[str] = "a motor"
 
     # fmt: off
     mass: str = parameter("motor.mass", "", "name of the mass on which the motor acts", '"rotor"', default="")

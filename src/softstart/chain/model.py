@@ -29,7 +29,6 @@ from softstart.drive.model import BY_PATH, has_brake
 from softstart.errors import InputError
 from softstart.hints import did_you_mean
 from softstart.input.documents import DocumentTable, document_text
-from softstart.input.files import Library
 from softstart.input.gear import NO_OUTPUT
 from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import (
@@ -60,7 +59,7 @@ OWN_LIMITS = (
 BRANCHING = re.compile(r"\[(branch|shaft\] \d+, (from|to|between|masses|mass|joins|ends|parent)\b)")
 
 
-class Chain(ParameterFile, Machine):
+class Chain(ParameterFile, Machine, library=LIBRARY):
     """Masses in a row and the shafts between neighbours; shaft k joins mass k and mass k + 1.
 
     Each quantity is a number in SI or a string with a unit, on its own shaft.
@@ -111,8 +110,6 @@ class Chain(ParameterFile, Machine):
     [R].
     """
 
-    WHAT: ClassVar[str] = "a chain"
-    LIBRARY: ClassVar[Library] = LIBRARY
     # as a drive has it
     position_given: ClassVar[bool] = True  # it is "mid-gap" without a word
     gear: ClassVar[None] = None  # masses and shafts are given at their own shafts

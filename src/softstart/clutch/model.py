@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any, ClassVar, Self, cast, get_args
+from typing import Any, Self, cast, get_args
 
 from softstart.clutch.laws import LAWS, Law, LawKind, shaped_law, table_law
 from softstart.drive import LoadKind
@@ -20,7 +20,7 @@ ABOVE = 1.0 + 1e-9  # a table may exceed MM by rounding
 SLOWEST, FASTEST = 1e-9, 1e9  # 1/s: beyond, the 24th power of a rate overflows
 
 
-class Clutch(ParameterFile, kw_only=False):
+class Clutch(ParameterFile, kw_only=False, library=LIBRARY):
     """A slipping clutch with constant driving speed, a shaft and a load: [C] (1).
 
     All values are numbers in SI, or text with a unit.
@@ -48,9 +48,6 @@ class Clutch(ParameterFile, kw_only=False):
     softstart.errors.InputError: stiffness = -1: the stiffness cp of the shaft must be above 0.
     law = "linaer": the engagement law is "linear", ... or "table"; did you mean "linear"?
     """
-
-    WHAT: ClassVar[str] = "a clutch"
-    LIBRARY: ClassVar[Library] = LIBRARY
 
     clutch_inertia: Number = parameter(
         "clutch.inertia", "kg*m^2", "inertia IM of the clutch side", '"0.98 kg*m^2"', "above 0"

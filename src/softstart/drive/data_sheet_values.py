@@ -21,10 +21,9 @@ def _nothing(path: str, unit: str, meaning: str, example: str, **more: Any) -> A
     return parameter(path, unit, meaning, example, "0 or more", default=0.0, **more)
 
 
-class SheetValues(ParameterFile):
+class SheetValues(ParameterFile, what="a data sheet"):
     """The parameters of a `DataSheet`, which follow from no other ones."""
 
-    WHAT: ClassVar[str] = "a data sheet"
     USUAL: ClassVar[Mapping[str, str]] = USUAL
 
     # fmt: off

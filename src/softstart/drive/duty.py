@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar, Final, Literal, Self, cast, get_args
+from typing import Any, Final, Literal, Self, cast, get_args
 
 from softstart.drive.machine import LoadKind, Machine
 from softstart.errors import InputError, Mistakes
@@ -40,7 +40,7 @@ MOST_SPEED: Final = 2.0  # times rated or target speed; beyond, a motor in field
 library = Library("softstart.drive", "a duty", "duties", folder="duties")
 
 
-class DutyStep(ParameterSet):
+class DutyStep(ParameterSet, what="a step of a duty"):
     """One step of a duty.
 
     Angles, speeds and torques are at the motor shaft, torque, friction and inertia of a load of a chain at
@@ -83,8 +83,6 @@ class DutyStep(ParameterSet):
     ----------
     docs/reference/drive-file.md.
     """
-
-    WHAT: ClassVar[str] = "a step of a duty"
 
     # fmt: off
     do: Do = parameter("duty.do", "", "kind of the step", '"start"', choices=get_args(Do), kw_only=False)
@@ -148,7 +146,7 @@ class DutyStep(ParameterSet):
         return -1.0 if self.set_speed is not None and self.set_speed < 0.0 else 1.0
 
 
-class Shift(ParameterSet):
+class Shift(ParameterSet, what="a shift"):
     """How often a duty is repeated.
 
     Parameters
@@ -165,8 +163,6 @@ class Shift(ParameterSet):
     ----------
     docs/reference/drive-file.md.
     """
-
-    WHAT: ClassVar[str] = "a shift"
 
     # fmt: off
     cycles_per_hour: Number = parameter("shift.cycles_per_hour", "1", "number of cycles in an hour", "50",
@@ -187,7 +183,7 @@ class Shift(ParameterSet):
             )
 
 
-class Duty(ParameterFile):
+class Duty(ParameterFile, library=library):
     """One cycle of steps, which a machine repeats.
 
     Parameters
@@ -215,9 +211,6 @@ class Duty(ParameterFile):
     ----------
     docs/reference/drive-file.md.
     """
-
-    WHAT: ClassVar[str] = "a duty"
-    LIBRARY: ClassVar[Library] = library
 
     # fmt: off
     steps: Rows[DutyStep] = component(DutyStep, least=0, default=(), kw_only=False)

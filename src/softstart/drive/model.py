@@ -60,7 +60,7 @@ def _rests(values: Mapping[str, Any]) -> Any:
     return values.get("load_kind") == "reactive" or held
 
 
-class Drive(ParameterFile, Machine):
+class Drive(ParameterFile, Machine, library=library):
     """Motor, shaft with a gap, load and start: the parameters that everything else is computed from.
 
     Each quantity is a number in SI or a string with a unit; many drives are a `softstart.machine_table`.
@@ -104,8 +104,6 @@ class Drive(ParameterFile, Machine):
     Equations of motion: [G] (1).
     """
 
-    WHAT: ClassVar[str] = "a drive"
-    LIBRARY: ClassVar[Library] = library
     KIND: ClassVar[str] = "drive"
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
     # as a chain has it

@@ -31,6 +31,11 @@ class ParameterFile(ParameterSet):
 
     LIBRARY: ClassVar[Library]
 
+    def __init_subclass__(cls, library: Library | None = None, what: str = "", **more: Any) -> None:
+        if library is not None:
+            cls.LIBRARY, what = library, library.what
+        super().__init_subclass__(what=what, **more)
+
     @classmethod
     def load(cls, given: str | os.PathLike[str], also: Mapping[str, object] | None = None) -> Self:
         """From a TOML file, or a shipped one by its name; `also` as in `from_toml`.

@@ -174,10 +174,10 @@ def component(
 class ParameterSet:
     """A value made of parameters: frozen, equal by content, hashable, copied and pickled as such.
 
-    All mistakes of one input raise a single `InputError`. `WHAT` names it in sentences, as "a drive", and
-    `SEVERAL` says what to do with several values for one. With `BATCH` its numbers may be arrays, which are
-    read-only. Bare numbers of parameters in `USUAL` are refused in a file, see `without_unit`. The fields of
-    a subclass with `kw_only=False` are positional arguments as well.
+    All mistakes of one input raise a single `InputError`. `WHAT`, the argument `what` of a class, names
+    it in sentences, as "a drive", and `SEVERAL` says what to do with several values for one. With `BATCH` its
+    numbers may be arrays, which are read-only. Bare numbers of parameters in `USUAL` are refused in a file,
+    see `without_unit`. The fields of a subclass with `kw_only=False` are positional arguments as well.
     """
 
     WHAT: ClassVar[str] = "a table"
@@ -189,7 +189,8 @@ class ParameterSet:
     FIELDS: ClassVar[Mapping[str, Component | Parameter]] = {}
     TABLES: ClassVar[tuple[DocumentTable, ...]] = ()
 
-    def __init_subclass__(cls, kw_only: bool = True) -> None:
+    def __init_subclass__(cls, kw_only: bool = True, what: str = "") -> None:
+        cls.WHAT = what or cls.WHAT
         declared = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
         parts = {name: one for name, one in vars(cls).items() if isinstance(one, Component)}
         for name, default in {name: one.default for name, one in (declared | parts).items()}.items():

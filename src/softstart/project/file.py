@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import nullcontext, suppress
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 from softstart.chain.machines import MachineLike, as_machine, known_from, refuse_other_kind
 from softstart.controller.base import Controller
@@ -75,7 +75,7 @@ class Source(ParameterSet):
             yield f'parameter = "{self.parameter}": a drive has no such parameter; {hint}'
 
 
-class Project(ParameterFile):
+class Project(ParameterFile, what="a project"):
     """A project: machines, strategies, optima and duties by name, the choice, and the heading of its report.
 
     It does not change; `added` and `replace` give another one. A logo is kept as a data URI, so that the file
@@ -111,8 +111,6 @@ class Project(ParameterFile):
     ----------
     docs/howto/keep-a-project.md.
     """
-
-    WHAT: ClassVar[str] = "a project"
 
     # fmt: off
     customer: str = _line("project.customer", "who the report is for", "Harbour Cranes Ltd")

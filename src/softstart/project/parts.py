@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_of, make_controller, named
@@ -36,19 +36,15 @@ def _file(table: str) -> Any:
     return _text(f"{table}.file", "text of its file", "'''...'''")
 
 
-class StoredMachine(ParameterSet):
+class StoredMachine(ParameterSet, what="a machine of a project"):
     """The file of a machine."""
-
-    WHAT: ClassVar[str] = "a machine of a project"
 
     name: str = _name("machine")
     file: str = _file("machine")
 
 
-class StoredStrategy(ParameterSet):
+class StoredStrategy(ParameterSet, what="a strategy of a project"):
     """The file of tuned gains, settings, or a torque profile."""
-
-    WHAT: ClassVar[str] = "a strategy of a project"
 
     name: str = _name("strategy")
     file: str = _file("strategy")
@@ -59,16 +55,14 @@ class StoredStrategy(ParameterSet):
         return strategy_of(self.file, self.name)
 
 
-class StoredDuty(ParameterSet):
+class StoredDuty(ParameterSet, what="a duty of a project"):
     """The file of a duty."""
-
-    WHAT: ClassVar[str] = "a duty of a project"
 
     name: str = _name("duty")
     file: str = _file("duty")
 
 
-class StoredOptimum(ParameterSet):
+class StoredOptimum(ParameterSet, what="an optimum of a project"):
     """The answer of an optimum with its claims, so that it can be checked on the exact machine.
 
     Parameters
@@ -92,8 +86,6 @@ class StoredOptimum(ParameterSet):
     ----------
     docs/howto/keep-a-project.md.
     """
-
-    WHAT: ClassVar[str] = "an optimum of a project"
 
     # fmt: off
     name: str = _name("optimum")
