@@ -58,8 +58,6 @@ def export_command(
         A compiled strategy: its name, path/to/file.py:ClassName, or a file of tuned gains (.toml).
     --gains FILE
         Tuned gains of this strategy, a file that softstart tune has written.
-    --param KEY=VALUE
-        Set a parameter of the strategy, for example time='200 ms'. May be repeated.
     --as c|st|fmu
         C99, Structured Text of IEC 61131-3 with PLCopen XML, or FMI 2.0 and 3.0.
     --real float32|float64

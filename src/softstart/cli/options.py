@@ -7,6 +7,9 @@ Options that several commands have alike; the docstring of a command describes i
 --at motor|output
     Show torques, speeds, angles, stiffness and inertia at the motor shaft or at the output of the gear.
     Default: as `units` of DRIVE says, else at the motor shaft. --json and CSV files are always at the motor.
+--budget TIME
+    Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0
+    disables it.
 --controllers A,B,...
     Strategies, separated by commas. Default: all installed ones that need no parameter.
 --cycles N
@@ -21,6 +24,12 @@ Options that several commands have alike; the docstring of a command describes i
     Print the result as one JSON object.
 --param CONTROLLER.KEY=VALUE
     Set a parameter of a strategy, for example ramp.time='0.2 s'. May be repeated.
+--pdf FILE
+    PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.
+--resolution KEY=STEP,...
+    Resolution of the inverter parameters, for example
+    torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,share=1%. Torque in % of the rated torque or in N*m.
+    Default: 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.
 --scheduler ADDRESS
     Compute on the dask cluster of this scheduler.
 --set KEY=VALUE
@@ -36,6 +45,14 @@ Options that several commands have alike; the docstring of a command describes i
     time (a clutch: after the lock-up).
 --workers N
     Number of parallel workers. Default: one per processor.
+
+Of commands with one strategy:
+
+--controller NAME
+    A strategy: its name, path/to/file.py:ClassName, a file of tuned gains (.toml), or a torque profile
+    (.csv).
+--param KEY=VALUE
+    Set a parameter of the strategy, for example time='200 ms'. May be repeated.
 """
 
 from __future__ import annotations
@@ -357,7 +374,7 @@ def described_options(text: str) -> dict[str, tuple[str | None, str]]:
     return {flag: (metavar or None, " ".join(lines.split())) for flag, metavar, lines in rows}
 
 
-SHARED = described_options(__doc__ or "")
+SHARED, WITH_ONE_STRATEGY = map(described_options, (__doc__ or "").split("Of commands with one strategy:"))
 
 
 class DocumentedCommand(click.Command):
@@ -367,7 +384,8 @@ class DocumentedCommand(click.Command):
         super().__init__(*args, **settings)
         # what stands behind the heading belongs to the options, not to the text of the command
         self.help, _, options = inspect.cleandoc(self.help or "").partition("\n\nOptions\n-------\n")
-        meanings = SHARED | described_options(options)
+        one = any(parameter.opts[0] == "--controller" for parameter in self.params)
+        meanings = SHARED | (WITH_ONE_STRATEGY if one else {}) | described_options(options)
         for parameter in self.params:
             if isinstance(parameter, click.Option):
                 parameter.metavar, parameter.help = meanings.get(parameter.opts[0], (None, None))

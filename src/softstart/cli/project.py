@@ -43,7 +43,8 @@ def project_command(
     "new" makes FILE from PARTS: machines (files or shipped names), tuned gains (robust.toml, schedule.toml),
     torque profiles (CSV, TOML) and duties, each called by its file's name; the first machine is chosen.
     "open" opens FILE on the interactive page, as "softstart serve FILE" does. "show" lists what is in it.
-    "report" writes the report of the machine and the strategy that are chosen. Names, notes and the choice
+    "report" writes the report of the machine and the strategy that are chosen, with --out, --pdf,
+    --resolution and --budget. Names, notes and the choice
     are edited on the page or in the file, which is TOML (see docs/howto/keep-a-project.md).
 
     Options
@@ -51,20 +52,17 @@ def project_command(
     --check
         With show: start each optimum again on its machine, and check what it claims.
     --out FILE
-        With report: HTML file to write, for example report.html.
-    --pdf FILE
-        With report: PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.
-    --resolution KEY=STEP,...
-        With report: resolution of the inverter parameters, for example torque=0.5%,time=10ms.
-    --budget TIME
-        With report: time limit of numerical optimisation, for example 60 (s).
+        HTML file to write, for example report.html.
     """
     from softstart.project import Project
 
     if parts and action != "new":
         raise InputError(f'"{parts[0]}": "{action}" takes one file; leave this word out.')
-    if check and action != "show":
-        raise InputError(f'--check: it goes with "softstart project show"; leave it out of "{action}".')
+    of_report = {"--out": to, "--pdf": pdf} | {f"--{name}": value for name, value in steps.items()}
+    for flag, value in ({"--check": check or None} | of_report).items():
+        owner = "show" if flag == "--check" else "report"
+        if value is not None and action != owner:
+            raise InputError(f'{flag}: it goes with "softstart project {owner}"; leave it out of "{action}".')
     if action == "new":
         return _new(Project, Path(file), parts)
     project = Project.open(file)

@@ -47,17 +47,8 @@ def report_command(
     -------
     --out FILE
         HTML file to write, for example report.html.
-    --pdf FILE
-        PDF file to write, for example report.pdf; printed with Chromium, Chrome or Edge.
     --controllers A,B,...
         Strategies to compare, including files of tuned gains. Default: all that need no parameter.
-    --resolution KEY=STEP,...
-        Resolution of the inverter parameters, for example
-        torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,share=1%. Torque in % of the rated torque or in
-        N*m. Default: 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.
-    --budget TIME
-        Time limit of numerical optimisation, for example 60 (s). Default: 20 s, of several shafts 60 s; 0
-        disables it.
     --project FILE
         TOML file with customer, project, author, logo, revisions, approval, data sources, paper size and
         decimal sign (example in docs/howto/read-a-report.md).
@@ -113,18 +104,6 @@ def sheet_command(
     takes and stated in its units; the start is simulated again with exactly the values shown, and half a step
     off. Of a file of tuned gains it shows every cell of the set. Where the drive has limits that the strategy
     does not keep, its parameters are set for them first, as in compare.
-
-    Options
-    -------
-    --controller NAME
-        A strategy: its name, path/to/file.py:ClassName, a file of tuned gains (.toml), or a torque
-        profile (.csv).
-    --param KEY=VALUE
-        Set a parameter of the strategy, for example time='200 ms'. May be repeated.
-    --resolution KEY=STEP,...
-        Resolution of the inverter parameters, for example
-        torque=0.5%,time=10ms,speed=1rpm,frequency=0.1Hz,share=1%. Torque in % of the rated torque or in
-        N*m. Default: 0.1 %, 1 ms, 1 rpm, 0.1 Hz and 0.01.
     """
     with working("starting the drive ..."), attributed():
         from softstart.reporting.sheet import parameter_sheet

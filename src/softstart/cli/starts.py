@@ -131,11 +131,6 @@ def simulate_command(
 
     Options
     -------
-    --controller NAME
-        A strategy: its name, path/to/file.py:ClassName, a file of tuned gains (.toml), or a torque
-        profile (.csv).
-    --param KEY=VALUE
-        Set a parameter of the strategy, for example time='200 ms'. May be repeated.
     --out DIR
         Write the figure (SVG, PNG), traces, stages and events (CSV) and report.md into this folder.
     """
@@ -224,10 +219,6 @@ def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -
 
     Options
     -------
-    --controller NAME
-        A controller's name, or path/to/file.py:ClassName.
-    --param KEY=VALUE
-        Set a parameter of the controller, for example period='0.5 ms'. May be repeated.
     --out DIR
         Write the Bode and Nyquist diagrams (SVG, PNG), the response (CSV) and report.md into this folder.
     """

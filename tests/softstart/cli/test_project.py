@@ -68,7 +68,8 @@ def test_a_machine_is_no_project(run, place):
         ended = run("project", action, "mine.toml")
         assert (ended.code, ended.err.count("\n")) == (2, 1)
         assert "this is a machine, not a project; " in ended.err
-    assert "it goes with" in run("project", "open", "mine.toml", "--check").err
+    for words, owner in (("open mine.toml --check", "show"), ("show mine.toml --pdf r.pdf", "report")):
+        assert f'it goes with "softstart project {owner}"' in run("project", *words.split()).err
 
 
 def test_open_opens_the_page(run, place, monkeypatch):
