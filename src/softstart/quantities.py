@@ -519,6 +519,15 @@ class Units(NamedTuple):
             value = self.gear.to_output(value, si)
         return value if size == 1.0 else value / size
 
+    def of_setting(self, name: str, si: str) -> Units:
+        """These units, of a frequency in rad/s those of SI: no gear makes another one of it.
+
+        >>> units = Units(speed="rpm")
+        >>> units.of_setting("coast_speed", "rad/s").speed, units.of_setting("corner", "rad/s").speed
+        ('rpm', 'rad/s')
+        """
+        return Units() if si == "rad/s" and "speed" not in name else self
+
     def rounded(self, value: float, si: str, digits: int) -> float:
         """The value in SI at the motor shaft whose number in these units has so many digits.
 

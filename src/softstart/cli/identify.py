@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -31,6 +32,7 @@ free_option = option("--free", options.read_list)
 @option("--wanted", options.read_list)
 @option("--max-torque")
 @option("--max-travel")
+@options.at_option
 @options.of_drive(options.read_drive)
 @answers(out=True)
 def plan_command(*, drive: Drive, standard: bool, **arguments: Any) -> Output:
@@ -132,6 +134,7 @@ def identify_command(
 @click.argument("folders", metavar="FOLDER...", nargs=-1, required=True)
 @option("--dates", options.read_list, required=True)
 @option("--worn-gap limit")
+@options.at_option
 @answers(out=True)
 def wear_command(*, folders: tuple[str, ...], **arguments: Any) -> Output:
     """Compute the growth of the gap from several identifications, and when it is worn.
@@ -148,4 +151,5 @@ def wear_command(*, folders: tuple[str, ...], **arguments: Any) -> Output:
     --out DIR
         Write the gaps (CSV), the figure and report.md into this folder.
     """
-    return softstart.follow_wear(folders, **arguments)
+    wear = softstart.follow_wear(folders, **arguments)
+    return replace(wear, found=tuple(map(options.seen, wear.found)))

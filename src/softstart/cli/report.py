@@ -92,6 +92,7 @@ def written_report(make: Callable[..., Report], to: str | None, pdf: str | None)
 @options.controller_option("--controller", required=True)
 @options.param_option
 @option("--resolution")
+@options.at_option
 @options.of_drive(options.read_machine_or_identified)
 @answers()
 def sheet_command(

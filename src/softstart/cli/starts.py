@@ -207,6 +207,7 @@ def fatigue_command(
 @command("linear")
 @controller_option("--controller", required=True)
 @options.param_option
+@options.at_option
 @options.of_drive(options.read_machine)
 @answers(out=True)
 def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -> Output:

@@ -50,6 +50,7 @@ PACKED = {"zlib": True, "complevel": 1, "shuffle": True}  # in netCDF
 @option("--figures", options.read_list)
 @options.workers_option
 @options.scheduler_option
+@options.at_option
 @option("--chunk", options.count())
 @option("--netcdf", type=click.Path(path_type=Path))
 @options.of_drive(options.read_machine)

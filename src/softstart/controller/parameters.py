@@ -139,8 +139,9 @@ def set_to_text(controller: object, setting: Mapping[str, float], units: Units) 
     'time 0.134 s, initial 7 N m'
     """
     si = {name: one.unit for name, one in declared_parameters(controller).items()}
+    seen = {name: units.of_setting(name, si[name]) for name in setting}
     return ", ".join(
-        f"{name} {units.shown(value, si[name]):g} {units.label(si[name])}".rstrip()
+        f"{name} {seen[name].shown(value, si[name]):g} {seen[name].label(si[name])}".rstrip()
         for name, value in setting.items()
     )
 

@@ -22,8 +22,6 @@ from softstart.results import Result
 from softstart.start.comparison import INTERVAL
 
 YEAR: Final = 365.25  # days
-SIGNIFICANT: Final = 3.0  # standard deviations by which a parameter has changed
-NOT_LINEAR: Final = 0.01  # chance below which the gap does not grow along a line
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,6 @@ class Wear(Result, view="identification.wear_sheet"):
     dates: tuple[date, ...]  # when their logs were taken
     line: Line
     limit: float | None  # the gap at which the drive is worn, rad
-    notes: tuple[str, ...]  # what else has changed, and what the line cannot tell
 
     @property
     def gaps(self) -> tuple[Estimate, ...]:
@@ -197,16 +194,16 @@ def follow_wear(
     line = Line.through(
         np.array([(one - days[0]).days / YEAR for one in days]),
         np.array([one.value for one in gaps]),
-        np.array([_deviation(one) for one in gaps]),
+        np.array([deviation(one) for one in gaps]),
     )
     # through the gear of the last one, as the plate may have been read since
     worn = None if limit is None else quantity_of(each[-1].drive, "gap", limit, "limit")
     if worn is not None and not worn > 0.0:
         raise InputError(f"limit = {show(limit)}: the gap of a worn drive is above 0.")
-    return Wear(each, names, days, line, worn, tuple(_notes(each, line)))
+    return Wear(each, names, days, line, worn)
 
 
-def _deviation(gap: Estimate) -> float:
+def deviation(gap: Estimate) -> float:
     """The standard deviation of an estimate."""
     return 0.5 * (gap.upper - gap.lower) / INTERVAL.quantile
 
@@ -224,26 +221,3 @@ def _date_after(first: date, years: float) -> date | None:
         return None
     day = first.toordinal() + years * YEAR
     return date.fromordinal(round(day)) if 1.0 <= day <= date.max.toordinal() else None
-
-
-def _notes(identifications: Sequence[Identification], line: Line) -> list[str]:
-    """What else has changed, and what the line cannot tell."""
-    notes = []
-    if line.chance < NOT_LINEAR:
-        notes.append(
-            f"The gaps do not lie on a line within their intervals (chance {line.chance:.1g}): wear that "
-            "runs in or speeds up, a repair, or a log that misleads. Their scatter has widened the intervals."
-        )
-    first, last = (
-        {estimate.name: estimate for estimate in identification.shared if estimate.known}
-        for identification in (identifications[0], identifications[-1])
-    )
-    for name in (name for name in first if name in last and name != "gap"):
-        both = first[name], last[name]
-        if abs(both[1].value - both[0].value) > SIGNIFICANT * math.hypot(*map(_deviation, both)):
-            notes.append(
-                f"{name} has changed from {both[0].value:.4g} to {both[1].value:.4g}, by more than its "
-                "intervals: another load or temperature, wear of more than the gap, or, if it is an inertia, "
-                "another scale of the torque signal."
-            )
-    return notes

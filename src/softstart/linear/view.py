@@ -29,6 +29,7 @@ from softstart.linear.plant import at_one_position, plant_scales
 from softstart.linear.systems import Mode
 from softstart.results import Result
 from softstart.start.demand import ControllerLike, as_controller
+from softstart.views.numbers import units_of
 
 VARIATIONS = (("J2", "load_inertia", (0.4, 2.5)), ("c", "stiffness", (0.9, 1.1)))
 POOR = 0.02  # mismatch above which a note says that the view is doubtful
@@ -142,7 +143,9 @@ class LinearView(Result, view="linear.linear_sheet"):
         cycle = max(self.cycles, key=lambda cycle: (cycle.stable, cycle.amplitude), default=None)
         vibration = ""
         if cycle is not None:
-            amplitude = f"amplitude of the twist {cycle.amplitude:.3g} rad"
+            units = units_of(self.drive)
+            size = f"{units.shown(cycle.amplitude, 'rad'):.3g} {units.label('rad')}{units.behind}"
+            amplitude = f"amplitude of the twist {size}"
             vibration = f"{cycle.frequency:.4g} rad/s, {amplitude}" if cycle.stable else amplitude
         alone = loop.with_gaps_open
         if loop.holds_speed and not alone.stable:

@@ -88,8 +88,9 @@ class Setting:
         if self.name in KEPT:
             return short(value), name, "or less", exact
         text = short(value) if self.step is None else step_multiple(value, self.step / share)
-        if "frequency" in self.name or (units.of(self.unit) == name and not units.gear):
-            units = IN_SI  # no gear makes another frequency; what is set is not said twice
+        units = units.of_setting(self.name, self.unit)
+        if units.of(self.unit) == name and not units.gear:
+            units = IN_SI  # what is set is not said twice
         there, other = units.is_at_output(self.unit), ""
         if there or name not in (unit(units.of(self.unit)), "ms"):
             shown = float(units.shown(self.rounded, self.unit))

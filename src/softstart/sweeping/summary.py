@@ -74,7 +74,7 @@ def summarise(results: xarray.Dataset) -> Summary:
     thin = -(-starts // MOST_FOR_QUANTILES)
     spreads = {name: spread((piece for _, piece in pieces(results, name)), thin) for name in figures}
     judged = "k_dyn" if "k_dyn" in figures else next(iter(figures), "")
-    return Summary(starts, statuses, spreads, judged, _worst(results, judged) if judged else {})
+    return Summary(starts, statuses, spreads, judged, worst_place(results, judged) if judged else {})
 
 
 def pieces(results: xarray.Dataset, name: str) -> Iterator[tuple[tuple[slice, ...], Any]]:
@@ -110,7 +110,7 @@ def spread(parts: Iterable[Any], thin: int = 1) -> dict[str, float]:
     return {"count": count, "min": least, **quantiles, "mean": math.fsum(total) / count, "max": most}
 
 
-def _worst(results: xarray.Dataset, name: str) -> dict[str, float | str]:
+def worst_place(results: xarray.Dataset, name: str) -> dict[str, float | str]:
     """The coordinates of the largest value; the first one of several."""
     best, where = -math.inf, {}
     for place, piece in pieces(results, name):

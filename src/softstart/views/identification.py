@@ -14,7 +14,7 @@ import numpy as np
 from softstart.drive import PARAMETERS
 from softstart.identification.model import FILTER
 from softstart.identification.result import AT_LIMIT
-from softstart.identification.wear import YEAR
+from softstart.identification.wear import YEAR, deviation
 from softstart.quantities import Units
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
 from softstart.views.numbers import IN_SI, NOTHING, TextTable, number, seen, short, titled, units_of
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 UNITS = {one.name: (one.path, one.unit) for one in PARAMETERS.values()}
 FIGURES = {"peak": ("peak shaft torque", "N*m"), "travel": ("load moves", "rad"), "end": ("lasts", "s")}
+SIGNIFICANT = 3.0  # standard deviations by which a parameter has changed
+NOT_LINEAR = 0.01  # chance below which the gap does not grow along a line
 SIMULATED = "simulated, not measured: the torque demand, and the motor as its encoder would count it"
 
 
@@ -244,6 +246,33 @@ def wear_conclusion(wear: Wear) -> list[str]:
     return said
 
 
+def wear_notes(wear: Wear) -> list[str]:
+    """What else has changed, and what the line cannot tell."""
+    notes, units = list[str](), units_of(wear.found[-1].drive)
+    if wear.line.chance < NOT_LINEAR:
+        notes.append(
+            f"The gaps do not lie on a line within their intervals (chance {wear.line.chance:.1g}): wear "
+            "that runs in or speeds up, a repair, or a log that misleads. Their scatter has widened the "
+            "intervals."
+        )
+    first, last = (
+        {estimate.name: estimate for estimate in identification.shared if estimate.known}
+        for identification in (wear.found[0], wear.found[-1])
+    )
+    for name in (name for name in first if name in last and name != "gap"):
+        both = first[name], last[name]
+        if abs(both[1].value - both[0].value) > SIGNIFICANT * math.hypot(*map(deviation, both)):
+            si = PARAMETERS[name].unit
+            before, now = (float(units.shown(one.value, si)) for one in both)
+            unit = f" {units.label(si)}{units.behind * units.is_at_output(si)}" if units.label(si) else ""
+            notes.append(
+                f"{name} has changed from {before:.4g} to {now:.4g}{unit}, by more than its "
+                "intervals: another load or temperature, wear of more than the gap, or, if it is an inertia, "
+                "another scale of the torque signal."
+            )
+    return notes
+
+
 def wear_table(wear: Wear, units: Units = IN_SI) -> TextTable:
     """The gap at each date, with its interval."""
     gaps = [
@@ -263,7 +292,7 @@ def wear_sheet(wear: Wear) -> Sheet:
         [f"{drive.name}: wear from {wear.dates[0]} to {wear.dates[-1]}"],
         tables=[wear_table(wear, units_of(drive))],
         conclusions=wear_conclusion(wear),
-        notes=wear.notes,
+        notes=wear_notes(wear),
         figures={"wear": partial(wear_figure, wear)},
         files={"wear.csv": table_file(wear_table(wear))},
         machine=drive,

@@ -14,7 +14,7 @@ from softstart.linear.plant import plant_scales
 from softstart.linear.systems import frequencies
 from softstart.linear.view import LinearView, margin_texts
 from softstart.views.drawing import COLOURS, GREY, drawing, entitle, head, new_figure
-from softstart.views.numbers import NOTHING, DataColumn, TextTable, seen_at
+from softstart.views.numbers import NOTHING, DataColumn, TextTable, units_of
 from softstart.views.sheet import Sheet, rows_file
 from softstart.views.starts import machine_lines
 
@@ -75,9 +75,9 @@ VARIATIONS = (
 )
 CYCLES = (
     DataColumn("rad/s", lambda cycle: cycle.frequency),
-    DataColumn("amplitude\nrad", lambda cycle: cycle.amplitude, 4),
-    DataColumn("bias\nrad", lambda cycle: cycle.bias, 4),
-    DataColumn("demand\n+- N m", lambda cycle: cycle.demand_amplitude, 1),
+    DataColumn("amplitude\nrad", lambda cycle: cycle.amplitude, 4, si="rad"),
+    DataColumn("bias\nrad", lambda cycle: cycle.bias, 4, si="rad"),
+    DataColumn("demand\n+- N m", lambda cycle: cycle.demand_amplitude, 1, si="N*m"),
     DataColumn("predicted", lambda cycle: "stable" if cycle.stable else "unstable"),
     DataColumn("motor\nlimits", lambda cycle: "exceeded" if cycle.beyond_limits else "kept"),
 )
@@ -98,7 +98,10 @@ def tables(view: LinearView, loop: Loop) -> list[TextTable]:
             [loop, *view.variations[-1:], *view.variations[:-1]],
         ),
         TextTable.of_data(
-            "Limit cycles predicted by the describing function of the gap", CYCLES, view.cycles
+            "Limit cycles predicted by the describing function of the gap",
+            CYCLES,
+            view.cycles,
+            units_of(view.drive),
         ),
     ]
 
@@ -112,8 +115,10 @@ def linear_notes(view: LinearView) -> list[str]:
             "not predicted; use simulate."
         )
     elif view.cycles:
+        units = units_of(view.drive)
+        mean = f"{units.shown(view.cycles[0].mean_torque, 'N*m'):.4g} {units.label('N*m')}{units.behind}"
         note = (
-            f"Mean shaft torque of the limit cycles: {view.cycles[0].mean_torque:.4g} N m. Assumed: the "
+            f"Mean shaft torque of the limit cycles: {mean}. Assumed: the "
             "controller has the same linear law in the gap. Verify with simulate."
         )
     return [note, *view.notes]
@@ -123,7 +128,7 @@ def linear_sheet(view: LinearView) -> Sheet:
     """What is shown of a linear view; its conclusion alone where there is no loop."""
     loop = view.loop
     title = f"{view.drive.name}: loop of {view.name}"
-    lines = [*machine_lines(seen_at(view.drive, "motor")), f"  under  {view.name}"]
+    lines = [*machine_lines(view.drive), f"  under  {view.name}"]
     if loop is None:
         why = f'controller = "{view.name}": {view.notes[0]}'
         return Sheet(title, lines, view.notes[0], machine=view.drive, no_figure=why)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softstart.drive import PARAMETERS
+from softstart.drive.model import LOAD
 from softstart.start.status import Status
-from softstart.sweeping.summary import SHARES, pieces
+from softstart.sweeping.summary import SHARES, pieces, worst_place
 from softstart.views import drawing as draw
 from softstart.views.drives import controllers_set_up
 from softstart.views.numbers import (
@@ -25,6 +27,7 @@ from softstart.views.numbers import (
     plural,
     plural_of,
     seen_at,
+    units_of,
 )
 from softstart.views.sheet import Sheet, Writer, columns_file, records_file
 from softstart.views.starts import machine_lines
@@ -44,8 +47,55 @@ MOST_CELLS = 4_000_000  # of a map
 MOST_SHOWN = 40  # starts in the table on the screen, in report.md and in JSON
 MOST_WRITTEN = 100_000  # starts in the file
 FILE, STATUS = "cells.csv", "status"
+TWO_WAYS = "Everything is at the motor shaft, as the load drives the motor in a part of the grid only."
 
 Part = tuple[str, NDArray[np.float64]]  # title, and the values along the axes drawn
+
+
+def as_seen(results: xarray.Dataset, machine: Machine) -> xarray.Dataset:
+    """The grid in the units and at the shaft of its machine.
+
+    The axes are brought over; figures, which may fill a disk, stay as they are: their attribute `seen` is
+    what they are multiplied by. At the motor shaft where the load drives the motor in a part of the grid.
+
+    >>> from softstart import Drive, sweep
+    >>> crane = Drive.load("crane-4amtkf").replace(gear_ratio=40.0, units="arcmin, at output")
+    >>> found = as_seen(sweep(crane, "direct", {"gap": [0.5, 2.0]}, workers=1), crane)
+    >>> found["gap"].values.round(2), found["gap"].units, found["peak_torque"].seen
+    (array([ 42.97, 171.89]), 'arcmin', 40.0)
+    """
+    units, axes = units_of(machine), set(results.coords)
+    if units.gear:
+        loads = [results[one].values if one in axes else [getattr(machine, one)] for one in LOAD]
+        ends = sum(map(np.min, loads)), sum(map(np.max, loads))
+        alike = (ends[0] < 0.0) == (ends[1] < 0.0)
+        units = units._replace(gear=units.gear._replace(load=ends[0]) if alike else None)
+    found = results.copy()
+    for name, one in results.variables.items():
+        key, si = str(name), str(one.attrs.get("units", ""))
+        seen_in = units.of_setting(key, si)
+        if one.dtype.kind not in "fiu" or (seen_in.of(si) == si and not seen_in.is_at_output(si)):
+            continue
+        size, about = float(seen_in.shown(1.0, si)), {"units": seen_in.of(si)}
+        if key in axes:
+            found = found.assign_coords({key: (one.dims, one.values * size, one.attrs | about)})
+        else:
+            found[key].attrs.update(about, seen=size)
+    found.attrs["at"] = units.at
+    return found
+
+
+def summary_as_seen(summary: Summary, seen: xarray.Dataset) -> Summary:
+    """The same of a summary of the grid."""
+    spreads = {
+        name: {key: value if key == "count" else value * _size(seen, name) for key, value in one.items()}
+        for name, one in summary.spreads.items()
+    }
+    return replace(summary, spreads=spreads, worst=worst_place(seen, summary.judged))
+
+
+def _size(results: xarray.Dataset, name: str) -> float:
+    return float(results[name].attrs.get("seen", 1.0))
 
 
 def sweep_figure(results: xarray.Dataset, name: str = "k_dyn") -> Figure | None:
@@ -84,7 +134,7 @@ def _each(results: xarray.Dataset, name: str, across: list[str], rest: list[str]
         one = results[name].isel(dict(zip(rest, index, strict=True)))
         values = {dim: results[dim].values[i] for dim, i in zip(rest, index, strict=True)}
         words = [v if dim == "controller" else f"{label(dim)} {_text(v)}" for dim, v in values.items()]
-        parts.append((", ".join(words), one.squeeze().transpose(*across).values))
+        parts.append((", ".join(words), _size(results, name) * one.squeeze().transpose(*across).values))
     return parts
 
 
@@ -98,7 +148,7 @@ def _worst(results: xarray.Dataset, name: str, across: list[str]) -> NDArray[np.
     for place, values in pieces(results, name):
         part = tuple(place[i] for i in kept)
         found[part] = worse(found[part], worse.reduce(values, axis=away))
-    return found
+    return _size(results, name) * found
 
 
 def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Part]) -> Figure:
@@ -116,7 +166,7 @@ def _maps(results: xarray.Dataset, name: str, across: list[str], parts: list[Par
         if bar.ax.get_yscale() == "log":
             draw.decade_ticks(bar.ax.yaxis)
         note = "   (grey: no figure)" if any(np.isnan(values).any() for _, values in parts) else ""
-        draw.entitle(figure, f"{results.attrs['title']}: {_axis(results, name)}{note}")
+        draw.entitle(figure, f"{_title(results)}: {_axis(results, name)}{note}")
     return figure
 
 
@@ -133,7 +183,7 @@ def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[P
             axes.axhline(float(name == "k_dyn"), color=draw.GREY, lw=0.8, ls=":")
         if name != "margin":
             axes.set_ylim(bottom=0.0)
-        draw.head(axes, results.attrs["title"], _axis(results, name), _axis(results, across[0]))
+        draw.head(axes, _title(results), _axis(results, name), _axis(results, across[0]))
         if any(title for title, _ in parts):
             draw.legend_beside(axes)
     return figure
@@ -142,6 +192,15 @@ def _curves(results: xarray.Dataset, name: str, across: list[str], parts: list[P
 def _what(results: xarray.Dataset) -> str:
     """What is at each place of the grid: a start, or a duty."""
     return "duty" if "softstart_duty" in results.attrs else "start"
+
+
+def _title(results: xarray.Dataset) -> str:
+    return f"{results.attrs['title']}{_at(results)}"
+
+
+def _at(results: xarray.Dataset) -> str:
+    """What a title adds: the shaft, where it is not that of the motor."""
+    return str(results.attrs.get("at", ""))
 
 
 def _unit(results: xarray.Dataset, name: str) -> str:
@@ -185,12 +244,15 @@ def start_table(results: xarray.Dataset) -> TextTable:
     ended, axes = columns.pop(STATUS), len(results.coords)
     shown: list[tuple[str, list[str]]] = []
     for name, values in columns.items():
-        texts = [_text(value, 6) for value in values] if len(shown) < axes else _figures(values)
+        if len(shown) < axes:
+            texts = [_text(value, 6) for value in values]
+        else:
+            texts = _figures([_size(results, name) * value for value in values])
         shown.append((label(name, _unit(results, name), "\n"), texts))
     if not set(ended) <= {status.name for status in Status if status.success}:
         shown.insert(axes + 1, (STATUS, [name.lower().replace("_", " ") for name in ended]))
     words = [heading for heading, column in shown if any(one[:1].isalpha() for one in column)]
-    return TextTable.of(f"Each {_what(results)}", dict(shown), words, keys=axes)
+    return TextTable.of(f"Each {_what(results)}{_at(results)}", dict(shown), words, keys=axes)
 
 
 def _figures(values: list[float]) -> list[str]:
@@ -225,10 +287,11 @@ def _tables(results: xarray.Dataset, summary: Summary) -> list[TextTable]:
         for name, spread in summary.spreads.items()
     ]  # fmt: skip
     numbers = [Column(heading) for heading in ("values", "from", "to")]
+    over = f"Over all {plural_of(_what(results))}{_at(results)}"
     ends = ("least", "5 %", "median", "95 %", "most")
     return [
-        TextTable("The grid", [Column("axis", False), *numbers, Column("unit", False)], axes),
-        TextTable.of_rows(f"Over all {plural_of(_what(results))}", ("figure", "unit"), ends, spreads),
+        TextTable(f"The grid{_at(results)}", [Column("axis", False), *numbers, Column("unit", False)], axes),
+        TextTable.of_rows(over, ("figure", "unit"), ends, spreads),
         *([start_table(results)] if summary.starts <= MOST_SHOWN else []),
     ]
 
@@ -246,7 +309,7 @@ def sweep_conclusion(results: xarray.Dataset, summary: Summary) -> str:
         places = ", ".join(f"{name} {_text(value, 5)}" for name, value in summary.worst.items())
         most = f"{summary.spreads[summary.judged]['max']:.4g}"
         unit = label(most, _unit(results, summary.judged), " ")
-        found.insert(0, f"Largest {label(summary.judged)} {unit} at {places}.")
+        found.insert(0, f"Largest {label(summary.judged)} {unit} at {places}{_at(results)}.")
     if summary.share_kept is not None:
         least = summary.spreads.get("margin")
         margin = f", least margin {100.0 * least['min']:.3g} %" if least and least["count"] else ""
@@ -268,6 +331,7 @@ def sweep_sheet(
     results: xarray.Dataset, summary: Summary, drive: Machine, fitted_to: Machine | None = None
 ) -> Sheet:
     """What is shown of a sweep."""
+    seen = as_seen(results, drive)
     drawn = {"sweep": summary.judged, "margin": "margin"}
     spreads = summary.spreads.items()
     files: dict[str, str | Writer] = {}
@@ -279,22 +343,25 @@ def sweep_sheet(
     return Sheet(
         f"{drive.name}: {plural(summary.starts, _what(results))}",
         [
-            *machine_lines(seen_at(drive, "motor")),
+            *machine_lines(drive if _at(seen) else seen_at(drive, "motor")),
             f"  Duty: {duty}" if (duty := results.attrs.get("softstart_duty")) else "",
             f"  {controllers_set_up(None, fitted_to)}" if fitted_to else "",
         ],
-        tables=_tables(results, summary),
-        conclusions=[sweep_conclusion(results, summary)],
+        tables=_tables(seen, summary_as_seen(summary, seen)),
+        conclusions=[sweep_conclusion(seen, summary_as_seen(summary, seen))],
         notes=[
-            f"{plural(count, _what(results))}: {Status[name].value}"
-            for name, count in summary.statuses.items()
-            if not Status[name].success
+            *([TWO_WAYS] if units_of(drive).gear and not _at(seen) else []),
+            *(
+                f"{plural(count, _what(results))}: {Status[name].value}"
+                for name, count in summary.statuses.items()
+                if not Status[name].success
+            ),
         ],
         figures={
-            file: partial(_figure, results, name, across)
+            file: partial(_figure, seen, name, across)
             for file, name in drawn.items()
             if name in summary.spreads and summary.spreads[name]["count"]
-            if (across := _drawn(results, name))
+            if (across := _drawn(seen, name))
         },
         files=files,
         machine=drive,

@@ -137,10 +137,9 @@ def schedule_cells(tuning: Tuning, table: Dataset) -> TextTable:
         f"gap\n{units.label('rad')}": units.shown(np.array(of["gap"]), "rad").tolist(),
         "J2\nkg m2": units.shown(np.array(of["load_inertia"]), "kg*m^2").tolist(),
         **{
-            label(one.name, units.label(one.unit), "\n"): units.shown(
-                np.array(of[one.name]), one.unit
-            ).tolist()
+            label(one.name, seen.label(one.unit), "\n"): seen.shown(np.array(of[one.name]), one.unit).tolist()
             for one in tuning.problem.ranges
+            for seen in (units.of_setting(one.name, one.unit),)
         },
         f"{metric}\ndefault": of[f"{tuning.metric}_default"],
         f"{metric}\ntuned": of[tuning.metric],
@@ -162,13 +161,13 @@ def _robust_table(tuning: Tuning, robust: RobustSet) -> TextTable:
         return "" if units.gear else at_output(tuning.drive, robust.gains[name], si[name])
 
     def shown(gains: Mapping[str, float]) -> Callable[[str], float]:
-        return lambda name: float(units.shown(gains[name], si[name]))
+        return lambda name: float(units.of_setting(name, si[name]).shown(gains[name], si[name]))
 
     columns = [
         DataColumn("parameter", str),
         DataColumn("default", shown(robust.defaults), text=short),
         DataColumn("robust", shown(robust.gains), text=short),
-        DataColumn("unit", lambda name: units.label(si[name])),
+        DataColumn("unit", lambda name: units.of_setting(name, si[name]).label(si[name])),
         DataColumn("robust, at\nthe output", there, text=str, optional=True),
     ]
     return TextTable.of_data(titled("One set for all", units), columns, list(robust.gains))

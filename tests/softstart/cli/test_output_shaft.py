@@ -51,8 +51,8 @@ def form(values: dict[str, str]) -> DataSheet:
 
     with Client(page("/never-opened")) as client:
         panel = DataSheetPanel(Session(controllers=["direct"]), "A")
-        for name, p in DataSheet.PARAMETERS.items():
-            panel._fields[name].value = values.get(p.path, "")
+        for name, field in panel._fields.items():
+            field.value = values.get(DataSheet.PARAMETERS[name].path, "")
         found = panel.sheet()
         client.delete()
     assert found is not None
