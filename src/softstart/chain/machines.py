@@ -16,11 +16,9 @@ from softstart.chain.elements import LIBRARY
 from softstart.chain.model import Chain
 from softstart.drive import Drive, Machine, library
 from softstart.drive.checks import BROADCAST
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
 from softstart.drive.machine_table import DriveColumns, MachineTable
 from softstart.errors import InputError
 from softstart.hints import nearest
-from softstart.input.documents import parsed
 from softstart.input.files import ABSENT, object_of, read_text, refusal_of
 from softstart.input.gear import alike
 from softstart.input.parameters import Parameter, Wording, at_motor, read_value
@@ -98,16 +96,14 @@ def is_chain_text(text: str) -> bool:
     return bool(re.search(r"^[ \t]*\[\[[ \t]*mass[ \t]*\]\]", text, re.MULTILINE))
 
 
-def known_from(text: str, where: str = "") -> Drive | Chain | UnknownStiffness:
-    """The drive, chain or data sheet of a TOML text; a sheet without stiffness at both ends of what is usual.
+def known_from(text: str, where: str = "") -> Drive | Chain:
+    """The drive or chain of a TOML text, or the drive of a data sheet.
 
     >>> known_from(library.text("crane-4amtkf")).gap
     0.5
     """
     if is_chain_text(text):
         return Chain.from_toml(text, where=where)
-    if DataSheet.describes(parsed(text, Wording(where, style="toml"), "a drive")):
-        return DataSheet.from_toml(text, where=where).possible
     return Drive.from_toml(text, where=where)
 
 

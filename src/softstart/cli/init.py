@@ -22,7 +22,7 @@ from softstart.cli.options import (
 from softstart.cli.running import working
 from softstart.drive import data_sheet_words as sheets
 from softstart.drive import library
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.data_sheet import DataSheet
 from softstart.drive.data_sheet_words import ABOUT, MACHINES, TYPICAL
 from softstart.errors import InputError
 from softstart.input.files import write_whole
@@ -98,9 +98,6 @@ def init_command(*, sheet: str | None, out: str | None, ask: bool, template: boo
     assumed = f" Assumed: {drive.assumed}." if drive.assumed else ""
     shipped = out in (*library.names(), *LIBRARY.names())  # whose name alone would be that machine
     path = shlex.quote(f"./{out}" if shipped else out)
-    # the drive file has one end only
-    if isinstance(data_sheet.possible, UnknownStiffness) and (sheet or asks):
-        path = shlex.quote(sheet or str(kept))
     sentence(
         console(), f"{out} is written: {data_sheet.motion}.{assumed} What next: softstart compare {path}"
     )
@@ -108,7 +105,7 @@ def init_command(*, sheet: str | None, out: str | None, ask: bool, template: boo
 
 def _both_ends(sheet: DataSheet) -> list[str]:
     """How the strategies compare at both ends of an unknown stiffness."""
-    if not isinstance(sheet.possible, UnknownStiffness):
+    if sheet.drive.soft is None:
         return []
     from softstart.start.comparison import compare
     from softstart.views.starts import both_ends

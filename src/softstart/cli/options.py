@@ -78,7 +78,7 @@ from softstart.chain.machines import is_chain
 from softstart.chain.model import Chain
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness, still_assumed
+from softstart.drive.data_sheet import DataSheet, still_assumed
 from softstart.drive.duty import Duty, StopBy
 from softstart.drive.machine import Machine
 from softstart.drive.model import OF_DUTY
@@ -153,22 +153,22 @@ def count(least: int = 1, most: int = 10**15) -> Reader:
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
-    drive = _drive(name, settings)
-    return _stiff_end(drive) if isinstance(drive, UnknownStiffness) else drive
+    return _at_one_end(_drive(name, settings))
 
 
-def _stiff_end(ends: UnknownStiffness) -> Drive:
-    """The drive with the stiff end of an unknown stiffness, for commands that take one drive."""
-    print(
-        "softstart: warning: no stiffness is known; this command computes with the stiff end of the usual "
-        "range only (compare, tune and report take both ends).",
-        file=sys.stderr,
-    )
-    return ends.drive
+def _at_one_end(drive: Drive) -> Drive:
+    """The drive, for commands that take one stiffness."""
+    if drive.soft is not None:
+        print(
+            "softstart: warning: no stiffness is known; this command computes with the stiff end of the "
+            "range only (compare, tune and report take both ends).",
+            file=sys.stderr,
+        )
+    return drive
 
 
-def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
-    """The drive, at both ends where a data sheet has no stiffness."""
+def _drive(name: str, settings: Sequence[str]) -> Drive:
+    """The drive of a file or a data sheet."""
     if is_chain(name):
         remedy = f'"softstart reduce {name} --out DIR" writes the two masses that stand for it'
         raise InputError(f'"{name}": this is a chain, and a drive is needed here; {remedy}.')
@@ -188,15 +188,10 @@ def _drive(name: str, settings: Sequence[str]) -> Drive | UnknownStiffness:
     for warning in data_sheet.motion_warnings:
         print(f"softstart: warning: {warning}", file=sys.stderr)
     drive_settings = read_settings(settings, Drive.PARAMETERS)[0]
-    ends = data_sheet.possible
-    drives = [
-        one.with_settings(settings) if settings else one
-        for one in (ends if isinstance(ends, UnknownStiffness) else (ends,))
-    ]
-    if "assumed" not in drive_settings:
-        drives = [one.replace(assumed=still_assumed(one, drive_settings)) for one in drives]
-    # a stiffness that is set as one of the drive leaves one end
-    return UnknownStiffness(*drives) if drives[0].stiffness != drives[-1].stiffness else drives[0]
+    drive = data_sheet.drive.with_settings(settings) if settings else data_sheet.drive
+    if "assumed" in drive_settings:
+        return drive
+    return drive.replace(assumed=still_assumed(drive, drive_settings))
 
 
 def _data_sheet(name: str) -> str | None:
@@ -211,11 +206,11 @@ def _data_sheet(name: str) -> str | None:
 def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
     """The one drive, or the chain, asked for, with its changes."""
     machine = read_as_known(name, settings)
-    return _stiff_end(machine) if isinstance(machine, UnknownStiffness) else machine
+    return _at_one_end(machine) if isinstance(machine, Drive) else machine
 
 
-def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | UnknownStiffness:
-    """The one drive, or the chain, asked for; a drive at both ends where a data sheet has no stiffness."""
+def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain:
+    """The one drive, or the chain, asked for, as far as it is known."""
     if is_chain(name):
         return Chain.load(name, also=read_changes(settings))
     known = (*drive_names(), *CHAINS.names())
@@ -226,13 +221,8 @@ def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain | Unknown
     return _drive(name, settings)
 
 
-def read_machine_or_identified(
-    name: str, settings: Sequence[str]
-) -> Drive | Chain | UnknownStiffness | Identification:
-    """The one drive, the chain, or the identification in a folder, with its changes.
-
-    A drive is at both ends where a data sheet has no stiffness.
-    """
+def read_machine_or_identified(name: str, settings: Sequence[str]) -> Drive | Chain | Identification:
+    """The one drive, the chain, or the identification in a folder, with its changes."""
     if name not in drive_names() and os.path.isfile(os.path.join(name, "identification.json")):
         from softstart.identification.result import Identification
 
@@ -486,8 +476,6 @@ def seen(found: Any) -> Any:
     shaft = click.get_current_context().meta.get(AT)
     if shaft is None:
         return found
-    if isinstance(found, UnknownStiffness):
-        return UnknownStiffness(*map(seen, found))
     if not isinstance(found, Machine):
         return replace(found, drive=seen(found.drive))
     try:
@@ -496,7 +484,7 @@ def seen(found: Any) -> Any:
         raise InputError(f"--at {shaft}: {refusal.reason}.") from None
 
 
-def typed_duty(given: Machine | Identification | UnknownStiffness) -> Duty | bool | None:
+def typed_duty(given: Machine | Identification) -> Duty | bool | None:
     """The duty of --duty for this machine, with the changes of --set; True: its own, None: no --duty."""
     name = click.get_current_context().meta.get(DUTY)
     if not name:

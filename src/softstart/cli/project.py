@@ -107,12 +107,12 @@ def _report(project: Project, progress: Any, typed: str, **steps: Any) -> Report
     from softstart.reporting import report
     from softstart.start.simulation import simulate
 
-    machine, chosen = project.loaded(), project.strategy
+    machine, chosen = project.single(), project.strategy
     if chosen in [one.name for one in project.strategies]:
         start = simulate(project.single(), project.controller())
         refuse_longer(start, f'strategy "{chosen}"')
     controllers = [project.controller()] if chosen else None
-    beside = project.loaded(project.beside) if project.beside else None
+    beside = project.single(project.beside) if project.beside else None
     return report(
         machine, controllers=controllers, command=typed, progress=progress, project=project, beside=beside,
         **steps,

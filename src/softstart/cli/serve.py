@@ -18,11 +18,11 @@ from softstart.page.serve import check_installed, listening, run_server
 from softstart.quantities import RefusedError
 
 if TYPE_CHECKING:
-    from softstart.page.machines import Loaded
+    from softstart.drive.machine import Machine
     from softstart.project import Project
 
 
-def _read(name: str, settings: Sequence[str]) -> Loaded | Project:
+def _read(name: str, settings: Sequence[str]) -> Machine | Project:
     """A machine as other commands read it, or a project."""
     if name not in drive_names() and refusal_of(name) is None:
         from softstart.project import Project
@@ -43,7 +43,7 @@ def _read(name: str, settings: Sequence[str]) -> Loaded | Project:
 @option("--token")
 @option("--expose", is_flag=True)
 @option("--no-browser", is_flag=True)
-def serve_command(*, drive: Loaded | Project, no_browser: bool, **arguments: Any) -> None:
+def serve_command(*, drive: Machine | Project, no_browser: bool, **arguments: Any) -> None:
     """Open the interactive page in the browser.
 
     DRIVE is a TOML file, of a machine or a project, or the name of a shipped drive or chain; by default the
@@ -66,7 +66,7 @@ def serve_command(*, drive: Loaded | Project, no_browser: bool, **arguments: Any
     serve_page(drive, Address(**arguments), not no_browser)
 
 
-def serve_page(drive: Loaded | Project, address: Address, browser: bool = True) -> None:
+def serve_page(drive: Machine | Project, address: Address, browser: bool = True) -> None:
     """Serve the page of this machine or project until it is interrupted."""
     address.check()
     if address.expose and (address.is_loopback or address.token is None):
@@ -91,7 +91,7 @@ def serve_page(drive: Loaded | Project, address: Address, browser: bool = True) 
         run_server(drive, address, listener, ready)
 
 
-def _warm_up(machine: Loaded | Project) -> None:
+def _warm_up(machine: Machine | Project) -> None:
     """Start all strategies once: whatever must be compiled is compiled before the page opens."""
     from softstart.page import machines
     from softstart.page.session import Session

@@ -14,7 +14,6 @@ from softstart.cli import options
 from softstart.cli.options import command, controller_option, option
 from softstart.cli.running import Output, answers, attributed, controllers_from_options, option_value, working
 from softstart.drive import PARAMETERS
-from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, SimulationError
 from softstart.input.gear import BEHIND
 from softstart.quantities import read_multiple, to_si, values_in
@@ -109,14 +108,14 @@ def read_tolerances(texts: Sequence[str], option: str = "--tolerance") -> dict[s
 @options.of_drive(options.read_machine_or_identified)
 @answers(out=True)
 def tune_command(
-    *, drive: Machine | Identification | UnknownStiffness, controller: str, params: dict[str, str],
+    *, drive: Machine | Identification, controller: str, params: dict[str, str],
     only: str | None, **arguments: Any,
 ) -> Output:  # fmt: skip
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
     DRIVE is a TOML file, the name of a shipped drive or chain (see: softstart drives), or the folder of an
-    identification: the gains are then robust over its confidence region. Those of a data sheet without any
-    stiffness are judged at both ends of what is usual. Of a chain the torques of all shafts
+    identification: the gains are then robust over its confidence region. Those of a drive whose
+    stiffness is not known are judged at both ends of its range. Of a chain the torques of all shafts
     count. By default the crane drive of the literature. The gains are written as files that every command
     accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
 

@@ -107,6 +107,7 @@ def _symbols(values: Values) -> SimpleNamespace:
         w1=get("initial_motor_speed"), w2=get("initial_load_speed"), rated=get("rated_torque"),
         power=get("rated_power"), speed=get("rated_speed"), permitted=get("permissible_torque"),
         output=get("permissible_output_torque"),
+        soft=get("soft_stiffness"), c=get("stiffness"),
         to_output=Gear(get("gear_ratio"), values.get("gear_efficiency", 1.0), Mc).of_torques,
         slow=(left > 0.0) & ((b1 + b2) * get("target_speed") >= left),
         busy=get("permissible_start_time") * get("starts_per_hour"),  # s in an hour
@@ -128,6 +129,8 @@ VISCOUS = "at {other} this takes more torque than the motor has left; lower the 
 RULES: tuple[tuple[str, str, Callable[[Any], Any], str], ...] = (
     ("maximum_torque", "starting_torque", lambda v: v.most < v.Ms,
      "the largest torque must not be below {other}; raise it, or leave it out"),
+    ("soft_stiffness", "stiffness", lambda v: v.soft >= v.c,
+     "the soft end must be below {other}, the stiff end; leave it out where the stiffness is known"),
     ("starting_torque", "load_torque", lambda v: v.Ms <= v.torque,
      "the starting torque cannot move the load against {other}; raise the one or lower the other"),
     ("starting_torque", "load_friction", lambda v: (v.Ms > v.torque) & (v.Ms <= v.Mc),

@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 from softstart.drive.data_sheet_checks import contradictions
 from softstart.drive.data_sheet_file import Entry, drive_entries, drive_text
@@ -20,7 +20,7 @@ from softstart.drive.data_sheet_mechanics import (
     slope_sine,
 )
 from softstart.drive.data_sheet_values import SheetValues
-from softstart.drive.data_sheet_words import BAND, STIFFNESSES, USUAL, converted, usual_rotor
+from softstart.drive.data_sheet_words import USUAL, converted, usual_rotor
 from softstart.drive.model import OTHER_DOCUMENTS, Drive
 from softstart.drive.plausibility import motion_warnings, plausibility_warnings
 from softstart.errors import InputError
@@ -52,18 +52,6 @@ def still_assumed(drive: Drive, settled: Iterable[str]) -> str:
         text for text in drive.assumed.split("; ")
         if not any(text.startswith(begin) and names <= settled for begin, names in SETTLED_BY.items())
     )  # fmt: skip
-
-
-class UnknownStiffness(NamedTuple):
-    """A drive of unknown stiffness: at the stiff end of what is usual, and at the soft end."""
-
-    drive: Drive
-    soft: Drive
-
-    @property
-    def name(self) -> str:
-        """Name of the drive."""
-        return self.drive.name
 
 
 class DataSheet(SheetValues):
@@ -198,20 +186,6 @@ class DataSheet(SheetValues):
 
     # at the motor shaft -----------------------------------------------------------------------------------
 
-    @property
-    def possible(self) -> Drive | UnknownStiffness:
-        """The drive; where no stiffness is known, with that at the soft end of what it may be.
-
-        >>> sheet = DataSheet(machine="rotor", rated_power=1e3, rated_speed=150, motor_inertia=0.01,
-        ...     output_inertia=0.1)
-        >>> [round(drive.Omega / (2 * math.pi), 9) for drive in sheet.possible]
-        [30.0, 3.0]
-        """
-        if STIFFNESSES & self.given().keys():
-            return self.drive
-        soft = self.replace(elastic_frequency=BAND[0]).drive
-        return UnknownStiffness(self.drive, soft.replace(assumed=self.drive.assumed))
-
     @cached_property
     def _motor_side(self) -> MotorSide:
         return motor_side(self)
@@ -267,7 +241,15 @@ class DataSheet(SheetValues):
 
     @cached_property
     def drive(self) -> Drive:
-        """The drive that follows, exactly; the numbers of `drive_toml` may have fewer digits."""
+        """The drive that follows, exactly; the numbers of `drive_toml` may have fewer digits.
+
+        Where no stiffness is known it is that at the stiff end of what is usual, with a soft end.
+
+        >>> sheet = DataSheet(machine="rotor", rated_power=1e3, rated_speed=150, motor_inertia=0.01,
+        ...     output_inertia=0.1)
+        >>> [round(one.Omega / (2 * math.pi), 9) for one in (sheet.drive, sheet.drive.soft)]
+        [30.0, 3.0]
+        """
         values = {name: one.value for name, one in self._entries.items()}
         try:
             return Drive._made(values, Wording("the drive that follows", style="toml"), [])

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from softstart.drive.data_sheet_mechanics import MotorSide, parts_text, total_stiffness
 from softstart.drive.data_sheet_values import SheetValues
+from softstart.drive.data_sheet_words import BAND
 from softstart.drive.model import Drive
 from softstart.input.documents import literal
 from softstart.quantities import Units, shortest
@@ -27,6 +28,7 @@ def drive_entries(sheet: SheetValues, side: MotorSide, motion: str) -> dict[str,
     gear, load, mark, given = side.gear, side.load, sheet.mark, sheet.given()
     stiffness, stiffness_from = total_stiffness(sheet, side)
     damping = 2.0 * sheet.damping_ratio * math.sqrt(stiffness * side.J1 * side.J2 / (side.J1 + side.J2))
+    soft = stiffness * (BAND[0] / BAND[1]) ** 2 if mark("stiffness") else None
     gap, assumed = sum(side.gaps.values()), "; ".join(sheet.assumed.values())
     no_gap, unsaid = mark("backlash") and "none given, assumed", assumed and "source" not in given
     more = f", brake, fan and coupling {sheet.added_inertia:.5g}" if sheet.added_inertia else ""
@@ -51,6 +53,7 @@ def drive_entries(sheet: SheetValues, side: MotorSide, motion: str) -> dict[str,
         "rated_speed": entry(sheet.rated_speed, "rad/s", "plate"),
         "torque_lag": entry(sheet.torque_lag or None, "ms", "of the inverter"),
         "stiffness": output_entry(sheet, side, stiffness, "N*m/rad", stiffness_from, soft_behind),
+        "soft_stiffness": entry(soft, "N*m/rad", f"elastic frequency {BAND[0]:g} Hz; results count at both"),
         "damping": entry(damping, "N*m*s/rad",
                          f"damping ratio {sheet.damping_ratio:.5g}{mark('damping_ratio')}"),
         "gap": output_entry(sheet, side, gap, "rad", parts_text(side.gaps) if gap else no_gap or "given as 0",

@@ -152,9 +152,7 @@ def total_stiffness(sheet: SheetValues, side: MotorSide) -> tuple[float, str]:
         return series, f"in series, {parts_text(side.stiffnesses)}{rigid}"
     frequency = sheet.elastic_frequency or BAND[1]
     c = (2.0 * math.pi * frequency) ** 2 * side.J1 * side.J2 / (side.J1 + side.J2)  # [G](8)
-    soft = f"; {c * (BAND[0] / BAND[1]) ** 2:.5g} at {BAND[0]:g} Hz"
-    assumed = sheet.mark("stiffness") + soft * (sheet.elastic_frequency is None)
-    return c, f"elastic frequency {frequency:g} Hz{assumed}"
+    return c, f"elastic frequency {frequency:g} Hz{sheet.mark('stiffness')}"
 
 
 def parts_text(values: Mapping[str, float]) -> str:

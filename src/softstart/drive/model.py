@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
+from functools import cached_property
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 import numpy as np
@@ -166,6 +167,9 @@ class Drive(ParameterFile, Machine, library=library):
         "above 0 and at most 1", default=1.0)
     stiffness: Number = parameter("shaft.stiffness", "N*m/rad", "stiffness of the shaft", '"368 N*m/rad"',
         "above 0", symbol="c", at_output="value")
+    soft_stiffness: MaybeNumber = parameter("shaft.soft_stiffness", "N*m/rad",
+        "smallest stiffness that the shaft may have, where its stiffness is not known", '"37 N*m/rad"',
+        "above 0", default=None, label="soft end of c", at_output="value")
     damping: Number = parameter("shaft.damping", "N*m*s/rad", "damping of the shaft", '"1.5 N*m*s/rad"',
         "0 or more", default=0.0, symbol="d", at_output="value")
     gap: Number = parameter("shaft.gap", "rad", "total angular gap", '"0.5 rad"', "0 or more", symbol="gap",
@@ -336,6 +340,24 @@ class Drive(ParameterFile, Machine, library=library):
         except InputError as error:
             mistakes += [Mistake(sentence) for sentence in error.sentences]
         return self._changed(given, wording, mistakes)
+
+    def _changed(self, changes: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake]) -> Self:
+        """As any parameters; a stiffness that is set is known, and has no soft end."""
+        known = {"soft_stiffness": None} if "stiffness" in changes else {}
+        return super()._changed({**known, **changes}, wording, mistakes)
+
+    @cached_property
+    def soft(self) -> Self | None:
+        """The drive at the soft end of an unknown stiffness, with its damping ratio; None if it is known.
+
+        >>> crane = Drive.load("crane-4amtkf").replace(soft_stiffness=92.11625, damping=0.3)
+        >>> crane.soft.stiffness, crane.soft.damping, crane.soft.soft
+        (92.11625, 0.15, None)
+        """
+        if self.soft_stiffness is None:
+            return None
+        share = self.soft_stiffness / self.stiffness
+        return self.replace(stiffness=self.soft_stiffness, damping=math.sqrt(share) * self.damping)
 
     def _duty_with(self, settings: list[str]) -> Duty:
         """The duty with changes of its steps as typed, as "duty[2].time=3 s"."""

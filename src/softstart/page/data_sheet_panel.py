@@ -110,7 +110,7 @@ class DataSheetPanel:
 
     def _use(self) -> None:
         if (sheet := self.sheet()) is not None:
-            self._session.load(sheet.possible)
+            self._session.load(sheet.drive)
             notify(f"{cut(sheet.name)} is loaded.")
 
     def _save(self) -> None:

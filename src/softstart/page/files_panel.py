@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from nicegui import ui
 
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.page import tasks
 from softstart.page.downloads import (
@@ -21,7 +22,6 @@ from softstart.page.downloads import (
     written_text,
 )
 from softstart.page.job_panel import JobPanel, Task
-from softstart.page.machines import Loaded
 from softstart.page.panel_parts import (
     POLL,
     Troubles,
@@ -91,7 +91,7 @@ class DriveFiles:
             self._shipped.set_value("")
             self._take_over(shipped_drives()[name])
 
-    def _take_over(self, machine: Loaded) -> None:
+    def _take_over(self, machine: Machine) -> None:
         self._troubles.say(())
         self._session.load(machine)
         notify(f"{cut(self._session.inputs.machine.name)} is loaded.")
@@ -197,13 +197,13 @@ class OtherMachine:
             self.choice.set_options(options, value=inputs.project.beside or self._first)
 
     @property
-    def machine(self) -> Loaded | None:
+    def machine(self) -> Machine | None:
         """The machine; None if none is chosen."""
         inputs, name = self._session.inputs, str(self.choice.value)
         if name == AS_LOADED:
             return inputs.origin
         if name in [one.name for one in inputs.project.machines]:
-            return inputs.project.loaded(name)
+            return inputs.project.single(name)
         return shipped_drives().get(name)
 
 
@@ -225,7 +225,8 @@ class BesidePanel(JobPanel):
     def task(self) -> Task:
         """Both comparisons."""
         inputs = self.session.inputs
-        return tasks.beside_task, inputs.both_ends, self._other.machine, list(inputs.controllers.values())
+        strategies = list(inputs.controllers.values())
+        return tasks.beside_task, inputs.machine_in_units, self._other.machine, strategies
 
     def estimate(self) -> float:
         """Two comparisons."""
@@ -288,7 +289,7 @@ class ParameterSheetPanel(JobPanel):
         """The sheet."""
         inputs = self.session.inputs
         name = file_name(inputs.machine.name, inputs.selected, "parameters", suffix=".txt")
-        return tasks.sheet_task, inputs.both_ends, inputs.controllers[inputs.selected], name
+        return tasks.sheet_task, inputs.machine_in_units, inputs.controllers[inputs.selected], name
 
     def estimate(self) -> float:
         """Some starts."""
@@ -357,7 +358,7 @@ class ReportPanel(JobPanel):
         strategies, beside = list(inputs.controllers.values()), self._other.machine
         return (
             tasks.report_task,
-            inputs.both_ends_with_duty,
+            inputs.machine_with_duty,
             strategies,
             command,
             name,

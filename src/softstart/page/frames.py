@@ -36,7 +36,7 @@ from softstart.start.comparison import SOFT_END
 from softstart.start.run import Run
 from softstart.views.drawing import strategy_colours
 from softstart.views.numbers import unit
-from softstart.views.starts import NO_STIFFNESS, position_notes
+from softstart.views.starts import no_stiffness, position_notes
 
 AS_SET_HERE = "Strategies count as they are set here; the report also sets them for the limits."
 QUICK_EVENTS = 8_000  # of a start while a slider is dragged; longer ones are computed after it
@@ -305,7 +305,9 @@ class FrameBuilder:
         recommendation = session.recommendation()
         session.follow(recommendation)
         text = page_sentence(recommendation.text)
-        advice = [text, *([NO_STIFFNESS] if inputs.soft_drive else [])]
+        advice = [text]
+        if (soft := inputs.soft_drive) is not None:
+            advice.append(no_stiffness(inputs.machine, soft))
         if inputs.machine.limits:
             advice.append(AS_SET_HERE)
         if at_equal_time := session.lowest_at_equal_time():

@@ -15,11 +15,11 @@ from nicegui import ui
 from nicegui.client import Client
 from nicegui.element import Element
 
+from softstart.drive.machine import Machine
 from softstart.page import USER
 from softstart.page.controls import Controls
 from softstart.page.frames import FrameBuilder
 from softstart.page.live import Frame, Live
-from softstart.page.machines import Loaded
 from softstart.page.sentences import log, sentence_of
 from softstart.page.session import Session
 from softstart.project import Project
@@ -52,7 +52,7 @@ def style() -> str:
     return "\n".join((WEB / name).read_text(encoding="utf-8") for name in names)
 
 
-def warm(drive: Loaded | Project) -> None:
+def warm(drive: Machine | Project) -> None:
     """Do what the first tab would wait for, and others behind it."""
     first_strategy(drive)
     for _, module, _ in PANELS:
@@ -61,14 +61,14 @@ def warm(drive: Loaded | Project) -> None:
 
 
 @cache
-def first_strategy(drive: Loaded | Project) -> str:
+def first_strategy(drive: Machine | Project) -> str:
     """The strategy that is selected at first: computed before the first tab, which others would wait for."""
     session = Session(drive)
     session.offer()
     return session.inputs.selected
 
 
-def build(drive: Loaded | Project) -> Session:
+def build(drive: Machine | Project) -> Session:
     """Build the page for the client of the moment, in a session of its own; returns that session."""
     client = nicegui.context.client
     ui.add_head_html(f"<style>{style()}</style>")
@@ -111,7 +111,7 @@ def build(drive: Loaded | Project) -> Session:
     return session
 
 
-def page(drive: Loaded | Project) -> None:
+def page(drive: Machine | Project) -> None:
     """The page of one client; what stands in its way is said instead."""
     try:
         build(drive)

@@ -21,7 +21,7 @@ from softstart.controller.finding import make_controller
 from softstart.errors import InputError, Mistakes
 from softstart.page.duty import packed_plan, plan_of, unpacked_plan
 from softstart.page.machines import machine_from, startable
-from softstart.page.session import LONGEST_TIME, SOFT, Inputs, Reference, Session
+from softstart.page.session import LONGEST_TIME, Inputs, Reference, Session
 from softstart.plugins import controller_names
 
 MAX_STORED = 64  # inputs of tabs that may be reloaded
@@ -67,7 +67,6 @@ def link_of(inputs: Inputs) -> str:
                        if name in installed and (settings := _settings(controller))},
         "selected": inputs.selected,
         "drawn": sorted(inputs.visible),
-        "soft": dict(inputs.soft_end),
         "at_time": inputs.at_time,
         "duty": packed_plan(inputs.duty),
         "reference": None if reference is None or reference.label not in installed else {
@@ -97,8 +96,6 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
         machine, _ = plan_of(machine_from(content["drive"]))
         origin = plan_of(machine_from(content["origin"]))[0] if content["origin"] else machine
         duty = unpacked_plan(content.get("duty"))
-        soft_end = {name: float(content["soft"][name]) for name in SOFT} if content.get("soft") else {}
-        origin.with_values(soft_end)  # refused here, not in the midst of a page
         same = origin == now.origin
         controllers = {
             name: controller
@@ -127,7 +124,6 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
         next(label for label in (selected, now.selected, *controllers) if label in controllers),
         visible & controllers.keys(),
         reference,
-        soft_end,
         str(content.get("at_time", ""))[:LONGEST_TIME],
         duty,
     )

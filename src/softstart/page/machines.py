@@ -16,7 +16,6 @@ from softstart.controller.base import Controller
 from softstart.controller.parameters import ControllerParameter, declared_parameters
 from softstart.controller.tuned import Tuned
 from softstart.drive import Drive
-from softstart.drive.data_sheet import UnknownStiffness
 from softstart.drive.machine import Machine, TwoMasses
 from softstart.errors import InputError
 from softstart.page.sentences import WORDS
@@ -296,9 +295,6 @@ def without(machine: Machine, path: str) -> Machine:
 def machine_from(text: str, where: str = "") -> Machine:
     """The drive or the chain of a TOML text; a chain has tables [[mass]]."""
     return (Chain if is_chain_text(text) else Drive).from_toml(text, where=where)
-
-
-Loaded = Machine | UnknownStiffness  # what a page may be given
 
 
 def startable(machine: Machine) -> Machine:

@@ -88,7 +88,7 @@ class ChecksPanel(JobPanel):
     def task(self) -> Task:
         """All checks."""
         inputs = self.session.inputs
-        return tasks.checked, inputs.both_ends, dict(inputs.controllers)
+        return tasks.checked, inputs.machine_in_units, dict(inputs.controllers)
 
     def estimate(self) -> float:
         """With limits the quickest start that keeps them takes longest."""
@@ -124,7 +124,7 @@ class TuningPanel(JobPanel):
         drive, name = self.session.inputs.machine_in_units, str(self.controller.value)
         grid = grid_of(drive, str(self.gaps.value), str(self.inertias.value))
         more = bool(self.certified.value), int(self.searches.value)
-        return tasks.tuning, self.session.inputs.both_ends, name, *grid, *more
+        return tasks.tuning, self.session.inputs.machine_in_units, name, *grid, *more
 
     def estimate(self) -> float:
         """In proportion to cells, searches and start positions."""

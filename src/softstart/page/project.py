@@ -10,7 +10,6 @@ from softstart.drive import Duty
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.page.duty import DutyPlan
-from softstart.page.machines import Loaded
 from softstart.page.sentences import WORDS, changes
 from softstart.project import Project
 from softstart.project.parts import (
@@ -130,7 +129,7 @@ def take_text(session: Session, text: str, label: str, where: str = "") -> str:
             return f"{cut(session.inputs.machine.name)} is loaded."
 
 
-def machine_of(text: str, where: str) -> Loaded:
+def machine_of(text: str, where: str) -> Machine:
     """The drive, chain or data sheet of a text; InputError with a sentence for each mistake."""
     for number, line in enumerate(text.splitlines(), 1):
         if len(line) > LONGEST_LINE:

@@ -18,7 +18,7 @@ from softstart.page.address import Address
 if TYPE_CHECKING:
     from starlette.types import ASGIApp
 
-    from softstart.page.machines import Loaded
+    from softstart.drive.machine import Machine
     from softstart.project import Project
 
 REMEDY = "install it with: pip install 'softstart[ui]'"
@@ -55,7 +55,7 @@ def listening(address: Address) -> socket.socket:
     return listener
 
 
-def application(drive: Loaded | Project) -> ASGIApp:
+def application(drive: Machine | Project) -> ASGIApp:
     """The ASGI application: NiceGUI with the page at `/`. One a process, since NiceGUI is one a process."""
     # NiceGUI, when it is imported, reads and stores things in the folder it is started in; the page stores
     # nothing, and nobody can put anything for it to read where no file can be
@@ -94,7 +94,7 @@ def application(drive: Loaded | Project) -> ASGIApp:
 
 
 def run_server(
-    drive: Loaded | Project, address: Address, listener: socket.socket, ready: Callable[[str], None]
+    drive: Machine | Project, address: Address, listener: socket.socket, ready: Callable[[str], None]
 ) -> None:
     """Serve until interrupted; `ready(url)` is called when the page can be opened."""
     import uvicorn

@@ -17,12 +17,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from softstart.chain.machines import load_machine
 from softstart.controller.finding import changed_controller, make_controller, ready_controller_names
 from softstart.drive import Drive
-from softstart.drive.data_sheet import UnknownStiffness, still_assumed
+from softstart.drive.data_sheet import still_assumed
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.hints import nearest
 from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
-from softstart.page.machines import STRATEGY, Loaded, startable, with_typed_changes, without
+from softstart.page.machines import STRATEGY, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, field_labels, sentence_of
 from softstart.project import Project, StoredOptimum
 from softstart.project.parts import refuse_longer
@@ -32,7 +32,6 @@ from softstart.start.comparison import (
     SOFT_END,
     Comparison,
     TooSlow,
-    as_far_as_known,
     changed_case,
     compared,
     equal_time,
@@ -48,7 +47,6 @@ if TYPE_CHECKING:
     from softstart.controller.base import Controller
     from softstart.start.run import Run
 
-SOFT = ("stiffness", "damping")  # what differs at the soft end of an unknown stiffness
 MAX_STRATEGIES = 24
 MAX_UNDO = 200
 PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are one step
@@ -144,7 +142,6 @@ class Inputs:
     selected: str  # label of the strategy with the large figure and the map
     visible: frozenset[str]  # labels of the strategies that are drawn beside it
     reference: Reference | None = None  # what all strategies are compared with
-    soft_end: Mapping[str, float] = field(default_factory=dict)  # of a drive loaded without stiffness: SOFT
     at_time: str = ""  # within which the strategies of the table are set to settle, "1.3x"; "" as they are
     duty: DutyPlan | None = None  # of the machine, without its own: start, hold, stop
     project: Project = NO_PROJECT  # what it has beside that: names, notes, other machines, earlier optima
@@ -169,41 +166,10 @@ class Inputs:
         same = units_of(self.machine) == self.units
         return self.machine if same else with_typed_changes(self.machine, {"units": self.units.text})
 
-    @cached_property
+    @property
     def soft_drive(self) -> Drive | None:
-        """The present drive at the soft end of an unknown stiffness; None where the stiffness is known.
-
-        A value that has been set since is that of both ends; a stiffness that has been set is known.
-
-        >>> from softstart.drive.data_sheet import UnknownStiffness, still_assumed
-        >>> crane = Session().inputs.machine
-        >>> session = Session(UnknownStiffness(crane, crane.replace(stiffness=0.01 * crane.stiffness)))
-        >>> session.set("gap", 1.0)
-        >>> round(session.inputs.soft_drive.stiffness, 5), session.inputs.soft_drive.gap
-        (3.68465, 1.0)
-        >>> session.set("stiffness", 400.0)
-        >>> session.inputs.soft_drive is None
-        True
-        """
-        now, origin = self.machine, self.origin
-        if not (self.soft_end and isinstance(now, Drive) and isinstance(origin, Drive)):
-            return None
-        if now.stiffness != origin.stiffness:
-            return None
-        unchanged = {
-            name: value
-            for name, value in self.soft_end.items()
-            if getattr(now, name) == getattr(origin, name)
-        }
-        return now.replace(**unchanged)
-
-    @cached_property
-    def both_ends(self) -> Loaded:
-        """`machine_in_units`, at both ends where its stiffness is unknown."""
-        stiff, soft = self.machine_in_units, self.soft_drive
-        if soft is None or not isinstance(stiff, Drive):
-            return stiff
-        return UnknownStiffness(stiff, soft.replace(units=stiff.units))
+        """The present drive at the soft end of an unknown stiffness; None where the stiffness is known."""
+        return self.machine.soft if isinstance(self.machine, Drive) else None
 
     @cached_property
     def plan(self) -> DutyPlan:
@@ -215,16 +181,6 @@ class Inputs:
         """`machine_in_units` with the duty, if one was made; InputError where its steps are wrong."""
         machine = self.machine_in_units
         return machine if self.duty is None else with_duty(machine, self.duty.duty)
-
-    @property
-    def both_ends_with_duty(self) -> Loaded:
-        """`machine_with_duty`, at both ends where its stiffness is unknown."""
-        ends = self.both_ends
-        if not isinstance(ends, UnknownStiffness):
-            return self.machine_with_duty
-        return UnknownStiffness(
-            *(one if self.duty is None else one.replace(duty=self.duty.duty) for one in ends)
-        )
 
     @property
     def claimed(self) -> frozenset[str]:
@@ -254,19 +210,16 @@ class Session:
     """
 
     def __init__(
-        self, machine: Loaded | Project | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
+        self, machine: Machine | Project | str = DEFAULT_DRIVE, controllers: Iterable[str] | None = None
     ) -> None:
         project = machine if isinstance(machine, Project) else Project()
         if isinstance(machine, Project):
-            machine = machine.loaded()
-        stiff, soft_end = _both_ends(load_machine(machine) if isinstance(machine, str) else machine)
-        stiff, duty = plan_of(stiff)
+            machine = machine.single()
+        stiff, duty = plan_of(startable(load_machine(machine) if isinstance(machine, str) else machine))
         names = list(ready_controller_names() if controllers is None else controllers)
         selected = _first_selected(names)
         self._initial = {name: make_controller(name) for name in names}
-        self.inputs = Inputs(
-            stiff, stiff, self._initial, selected, frozenset((selected,)), soft_end=soft_end, duty=duty
-        )
+        self.inputs = Inputs(stiff, stiff, self._initial, selected, frozenset((selected,)), duty=duty)
         self._past: list[Inputs] = []
         self._future: list[Inputs] = []
         self._gesture = ("", -math.inf)  # what was changed last, and when
@@ -386,7 +339,7 @@ class Session:
         if plan != self.inputs.plan:
             self._change(gesture, duty=plan)
 
-    def load(self, machine: Loaded) -> None:
+    def load(self, machine: Machine) -> None:
         """Another drive or chain, without the optima and gains that were computed for this one.
 
         A project keeps its machines and strategies as they are now, and the other machine is the one chosen.
@@ -399,8 +352,7 @@ class Session:
             project = Project(
                 **{key: kept[key] for key in kept if key not in ("machine", "beside", "strategy")}
             )
-        stiff, soft_end = _both_ends(machine)
-        stiff, duty = plan_of(stiff)
+        stiff, duty = plan_of(startable(machine))
         inputs = self.inputs
         controllers = {
             label: controller for label, controller in inputs.controllers.items() if label in self._initial
@@ -411,7 +363,6 @@ class Session:
             controllers=controllers,
             selected=inputs.selected if inputs.selected in controllers else _first_selected(controllers),
             visible=inputs.visible.intersection(controllers),
-            soft_end=soft_end,
             duty=duty,
             project=project,
             optima={},
@@ -420,9 +371,8 @@ class Session:
 
     def open(self, project: Project) -> None:
         """Another project: its machine, strategies and choice; one step that can be undone."""
-        present = self.inputs.both_ends_with_duty
-        stiff, soft_end = _both_ends(project.loaded() if project.machines else present)
-        stiff, duty = plan_of(stiff)
+        present = self.inputs.machine_with_duty
+        stiff, duty = plan_of(startable(project.single() if project.machines else present))
         own = {one.name: one.controller for one in project.players}
         if len(self._initial | own) > MAX_STRATEGIES:
             raise InputError(
@@ -433,7 +383,7 @@ class Session:
         selected = chosen if chosen in controllers else _first_selected(controllers)
         self._change(
             machine=stiff, origin=stiff, controllers=controllers, selected=selected,
-            visible=frozenset((selected, *own)), soft_end=soft_end, duty=duty, project=project,
+            visible=frozenset((selected, *own)), duty=duty, project=project,
             optima={},
         )  # fmt: skip
 
@@ -770,12 +720,6 @@ class Session:
             raise InputError(f'strategy "{cut(label)}": there is no strategy of this name; {hint}')
 
 
-def _both_ends(machine: Loaded) -> tuple[Machine, dict[str, float]]:
-    """The machine to begin with, and what differs at the soft end of an unknown stiffness."""
-    stiff, _, soft = as_far_as_known(machine)
-    return startable(stiff), {} if soft is None else {name: getattr(soft, name) for name in SOFT}
-
-
 def _without(things: Mapping[str, Any], label: str) -> dict[str, Any]:
     return {name: thing for name, thing in things.items() if name != label}
 
@@ -783,12 +727,16 @@ def _without(things: Mapping[str, Any], label: str) -> dict[str, Any]:
 def _without_settled(inputs: Inputs) -> Inputs:
     """The inputs without assumptions about values that have been set since the drive was loaded."""
     drive, origin = inputs.machine, inputs.origin
-    if not (isinstance(drive, Drive) and isinstance(origin, Drive) and origin.assumed):
+    if not (isinstance(drive, Drive) and isinstance(origin, Drive)):
         return inputs
     # compared with the loaded drive, so that a slider that goes back to its place brings them back too
+    if origin.soft_stiffness is not None and drive.stiffness == origin.stiffness:
+        drive = drive.replace(soft_stiffness=origin.soft_stiffness)
     values, loaded = drive.given(), origin.given()
     assumed = still_assumed(origin, [name for name in values if values[name] != loaded.get(name)])
-    return inputs if assumed == drive.assumed else replace(inputs, machine=drive.replace(assumed=assumed))
+    if origin.assumed and assumed != drive.assumed:
+        drive = drive.replace(assumed=assumed)
+    return inputs if drive == inputs.machine else replace(inputs, machine=drive)
 
 
 def _first_selected(labels: Iterable[str]) -> str:

@@ -24,7 +24,7 @@ from softstart.controller.parameters import declared_parameters
 from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes, SimulationError
 from softstart.page.downloads import file_name, profile_file, written_text
-from softstart.page.machines import Loaded, with_typed_changes
+from softstart.page.machines import with_typed_changes
 from softstart.page.sentences import page_sentence
 from softstart.parallel import Progress
 from softstart.project.parts import StoredOptimum, player_of
@@ -142,7 +142,7 @@ def curve(
 
 
 def beside_task(
-    first: Loaded, second: Loaded, controllers: Sequence[Controller], *, progress: Progress
+    first: Machine, second: Machine, controllers: Sequence[Controller], *, progress: Progress
 ) -> TaskResult:
     """Two machines side by side, or one before and after changes."""
     from softstart.start.beside import side_by_side
@@ -152,7 +152,7 @@ def beside_task(
 
 
 def tuning(
-    drive: Loaded,
+    drive: Machine,
     controller: str,
     gaps: Sequence[Any] | None,
     inertias: Sequence[Any] | None,
@@ -265,7 +265,7 @@ def identified(
     return TaskResult(shown(fit.sheet), files, drive=fit.drive)
 
 
-def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress: Progress) -> TaskResult:
+def checked(possible: Machine, controllers: Mapping[str, Controller], *, progress: Progress) -> TaskResult:
     """Strategies from each start position, margins to limits, life under them, and the quickest start."""
     from softstart.optimal.optimize import optimize
     from softstart.views.checks import margins_sheet, positions_sheet
@@ -301,7 +301,7 @@ def checked(possible: Loaded, controllers: Mapping[str, Controller], *, progress
     return with_optimum(best, label, *sheets, optimum_sheet(best, [row.run for row in compared.rows]))
 
 
-def sheet_task(drive: Loaded, controller: Controller, file: str, *, progress: Progress) -> TaskResult:
+def sheet_task(drive: Machine, controller: Controller, file: str, *, progress: Progress) -> TaskResult:
     """The parameter sheet of a strategy: rounded values, and the start with exactly these."""
     from softstart.reporting.sheet import parameter_sheet
 
@@ -311,12 +311,12 @@ def sheet_task(drive: Loaded, controller: Controller, file: str, *, progress: Pr
 
 
 def report_task(
-    drive: Loaded,
+    drive: Machine,
     controllers: Sequence[str | Controller],
     command: str,
     file: str,
     project: Project,
-    beside: Loaded | None,
+    beside: Machine | None,
     *,
     progress: Progress,
 ) -> TaskResult:

@@ -18,7 +18,6 @@ from softstart.chain.machines import MachineLike, as_machine, known_from, refuse
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
 from softstart.drive import PARAMETERS, Duty, Machine
-from softstart.drive.data_sheet import UnknownStiffness
 from softstart.errors import InputError, Mistakes
 from softstart.hints import did_you_mean, nearest
 from softstart.input.documents import DocumentTable, parsed
@@ -94,7 +93,7 @@ class Project(ParameterFile, what="a project"):
     --------
     >>> slow = 'kind = "settings"\\ncontroller = "ramp"\\n[parameters]\\ntime = 0.3'
     >>> project = Project.new("crane-4amtkf").added("slow", slow)
-    >>> project.machine, project.loaded().gap, project.controller("slow").name
+    >>> project.machine, project.single().gap, project.controller("slow").name
     ('crane-4amtkf', 0.5, 'ramp (slow)')
     >>> Project.read(project.to_toml()) == project
     True
@@ -297,7 +296,7 @@ class Project(ParameterFile, what="a project"):
         """What has a controller: own strategies, then optima."""
         return (*self.strategies, *self.optima)
 
-    def loaded(self, name: str = "") -> Machine | UnknownStiffness:
+    def single(self, name: str = "") -> Machine:
         """A machine by its name, by default the chosen one or the only one, with the duty chosen."""
         files = {one.name: one.file for one in self.machines}
         name = name or self.machine or (next(iter(files)) if len(files) == 1 else "")
@@ -305,21 +304,9 @@ class Project(ParameterFile, what="a project"):
             raise InputError(
                 f'[choice] machine = "{name}": the project has no such machine; {_meant(name, files)}'
             )
-        machine = known_from(files[name], f'machine "{name}"')
+        machine: Any = known_from(files[name], f'machine "{name}"')
         text = next((one.file for one in self.duties if one.name == self.duty), "")
-        if not text:
-            return machine
-        if isinstance(machine, UnknownStiffness):
-            return UnknownStiffness(*(self._on_duty(one, text) for one in machine))
-        return self._on_duty(machine, text)
-
-    def _on_duty(self, machine: Any, text: str) -> Any:
-        return machine.replace(duty=Duty.read_for(machine, text, f'duty "{self.duty}"'))
-
-    def single(self, name: str = "") -> Machine:
-        """A machine as `loaded`; of an unknown stiffness the stiff end."""
-        machine = self.loaded(name)
-        return machine.drive if isinstance(machine, UnknownStiffness) else machine
+        return machine.replace(duty=Duty.read_for(machine, text, f'duty "{self.duty}"')) if text else machine
 
     @property
     def name(self) -> str:

@@ -20,7 +20,7 @@ from softstart.chain.machines import MachineLike, as_machine
 from softstart.controller import Controller, make_controller
 from softstart.controller.base import label_of
 from softstart.drive import Machine
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.data_sheet import DataSheet
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, Mistakes, SimulationError, fact_of
 from softstart.input.files import write_whole
@@ -289,7 +289,7 @@ class Report(Result):
 
 
 def report(
-    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
+    drive: MachineLike | Uncertain | DataSheet,
     *,
     controllers: Sequence[ControllerLike] | None = None,
     parameters: Mapping[str, Mapping[str, object]] | None = None,

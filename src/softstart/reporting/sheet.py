@@ -20,7 +20,7 @@ from softstart.controller import CompiledController, Controller
 from softstart.controller.base import label_of
 from softstart.controller.tuned import RobustGains, Tuned
 from softstart.drive import Drive, Machine
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.data_sheet import DataSheet
 from softstart.drive.machine_table import MachineTable
 from softstart.errors import InputError, SimulationError
 from softstart.linear.view import loop_in_words
@@ -278,7 +278,7 @@ class ParameterSheet(Result):
 
 
 def parameter_sheet(
-    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
+    drive: MachineLike | Uncertain | DataSheet,
     controller: ControllerLike,
     *,
     parameters: Mapping[str, object] | None = None,

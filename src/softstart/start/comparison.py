@@ -17,8 +17,7 @@ from softstart.controller.base import Controller, Effort, label_of
 from softstart.controller.finding import ready_controller_names
 from softstart.controller.parameters import set_to_text
 from softstart.drive import Drive
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
-from softstart.drive.data_sheet_words import BAND
+from softstart.drive.data_sheet import DataSheet
 from softstart.drive.machine import Machine
 from softstart.drive.machine_table import MachineTable
 from softstart.drive.plausibility import plausibility_warnings
@@ -49,7 +48,7 @@ WORN_GAP = 4.0
 LIGHT_INERTIA = 0.4
 SCALED: Final = {"gap x4": {"gaps": WORN_GAP}, "J2 x0.4": {"load_inertia": LIGHT_INERTIA}}
 LEFT_POSSIBLE = "the upper end of 95 %"  # the case of a row whose drive is known within intervals
-SOFT_END = f"elastic frequency {BAND[0]:g} Hz"  # the case of a row whose drive is of unknown stiffness
+SOFT_END = "soft shaft"  # the case of a row whose drive is of unknown stiffness
 UNCERTAIN_FIGURES: Final = ("k_dyn", "peak_torque")
 FEWEST_KNOWN: Final = 0.9  # of the drives drawn whose start must have such a figure
 AT_TIME: Final = "1.3x"  # of the settled time of direct: the time at which strategies are compared
@@ -231,7 +230,7 @@ class Comparison(Result, view="starts.comparison_sheet"):
 
 
 def compare(
-    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness = DEFAULT_DRIVE,
+    drive: MachineLike | Uncertain | DataSheet = DEFAULT_DRIVE,
     controllers: Sequence[ControllerLike] | ControllerLike | None = None,
     *,
     parameters: Mapping[str, Mapping[str, object]] | None = None,
@@ -246,10 +245,10 @@ def compare(
     ----------
     drive : Drive, Chain, Identification, DataSheet, str or path
         One drive, a chain, or the name or file of one of them. Controllers are set up for a chain as they are
-        in `simulate`. Of a data sheet without any stiffness the stiff end of what is usual counts; limits
-        must be kept at the soft end as well, and `soft_end` compares the strategies as set up for that. With
-        an identification each row has `intervals` over 200 drives that its logs leave possible, and limits
-        must be kept at their upper ends as well.
+        in `simulate`. Of a drive with a soft end of its stiffness, as of a data sheet without any, the stiff
+        end counts; limits must be kept at the soft end as well, and `soft_end` compares the strategies as set
+        up for that. With an identification each row has `intervals` over 200 drives that its logs leave
+        possible, and limits must be kept at their upper ends as well.
     controllers : sequence of str or Controller, optional
         Each as in `simulate`. By default all installed controllers that need no parameter, and those that
         are given parameters.
@@ -423,10 +422,11 @@ def set_for_limits(
 def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, MachineTable | None, Drive | None]:
     """The machine itself, `count` drives where it is known within intervals, and that of the soft end."""
     if isinstance(drive, DataSheet):
-        drive = drive.possible
-    if isinstance(drive, UnknownStiffness):
-        return drive.drive, None, drive.soft
-    return (drive.drive, drive.draws(count), None) if isinstance(drive, Uncertain) else (drive, None, None)
+        drive = drive.drive
+    if isinstance(drive, Uncertain):
+        return drive.drive, drive.draws(count), None
+    drive = as_machine(drive)
+    return drive, None, drive.soft if isinstance(drive, Drive) else None
 
 
 def make_controllers(

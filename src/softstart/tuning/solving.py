@@ -8,7 +8,7 @@ from typing import Any
 
 from softstart.chain.machines import MachineLike
 from softstart.drive import Drive, Duty
-from softstart.drive.data_sheet import DataSheet, UnknownStiffness
+from softstart.drive.data_sheet import DataSheet
 from softstart.errors import InputError
 from softstart.parallel import Pool, checked_workers, usable_workers
 from softstart.start.comparison import Uncertain
@@ -32,7 +32,7 @@ GENERATIONS = 60
 
 
 def tune(
-    drive: MachineLike | Uncertain | DataSheet | UnknownStiffness,
+    drive: MachineLike | Uncertain | DataSheet,
     controller: ControllerLike,
     gaps: object = None,
     inertias: object = None,

@@ -9,7 +9,6 @@ from typing import Any
 
 from softstart.controller.parameters import declared_parameters
 from softstart.drive import Drive, Machine
-from softstart.drive.data_sheet_words import BAND
 from softstart.drive.plausibility import plausibility_warnings
 from softstart.errors import Sentence
 from softstart.start.comparison import SOFT_END, Comparison
@@ -342,8 +341,7 @@ def comparison_table(
 
 def at_soft_end(rows: Sequence[Row]) -> tuple[DataColumn, ...]:
     """K_dyn at the soft end of an unknown stiffness, if it is unknown."""
-    heading = f"K\n{BAND[0]:g} Hz"
-    figure = DataColumn(heading, lambda row: row.cases[SOFT_END].k_dyn, 3)
+    figure = DataColumn("K\nsoft", lambda row: row.cases[SOFT_END].k_dyn, 3)
     return (figure,) if SOFT_END in rows[0].cases else ()
 
 
@@ -352,24 +350,32 @@ def of_the_unknown(rows: Sequence[Row]) -> tuple[DataColumn, ...]:
     return INTERVALS if rows[0].intervals else at_soft_end(rows)
 
 
-NO_STIFFNESS = (
-    "No stiffness is known. Strategies are set up for the stiff end of what is usual, elastic frequency "
-    f"{BAND[1]:g} Hz; K {BAND[0]:g} Hz: so set up at the soft end, where limits must be kept as well."
-)
+def no_stiffness(stiff: Any, soft: Any) -> str:
+    """What is computed for a drive whose stiffness is not known."""
+    return (
+        f"No stiffness is known. Strategies are set up for the stiff end, elastic frequency {hertz(stiff)} "
+        f"Hz; K soft: so set up at the soft end, {hertz(soft)} Hz, where limits must be kept as well."
+    )
+
+
+def hertz(drive: Any) -> str:
+    """The elastic frequency of a drive as it is said."""
+    return f"{float(drive.Omega) / math.tau:.3g}"
 
 
 def both_ends(comparison: Comparison) -> list[str]:
     """How the choice differs between both ends of an unknown stiffness; nothing where it is known."""
     if comparison.soft_end is None:
         return []
-    both, stiff = comparison.recommendation, comparison.at_this_end
-    soft = comparison.soft_end.recommendation
-    same = len({tuple(row.name for row in choice.shown) for choice in (both, stiff, soft)}) == 1
+    ends = comparison.drive, comparison.soft_end.drive
+    choices = comparison.recommendation, comparison.at_this_end, comparison.soft_end.recommendation
+    both, at_stiff, at_soft = map(_chosen, choices)
+    same = len({tuple(row.name for row in choice.shown) for choice in choices}) == 1
     return [
-        NO_STIFFNESS,
+        no_stiffness(*ends),
         Sentence(
-            f"For both ends: {_chosen(both)}. If it were known to be at {BAND[1]:g} Hz: {_chosen(stiff)}; at "
-            f"{BAND[0]:g} Hz, and set up for it: {_chosen(soft)}. "
+            f"For both ends: {both}. If it were known to be at {hertz(ends[0])} Hz: {at_stiff}; at "
+            f"{hertz(ends[1])} Hz, and set up for it: {at_soft}. "
             f"The choice {'is the same in all cases' if same else 'depends on the stiffness'}.",
             "Give shaft.elastic_frequency, from the oscillation of the speed in a log, or a stiffness.",
         ),

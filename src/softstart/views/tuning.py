@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from softstart.controller.parameters import declared_parameters
-from softstart.drive.data_sheet_words import BAND
 from softstart.errors import Sentence
 from softstart.tuning.problem import MARGIN
 from softstart.views.drawing import SMALL, colour_scale, drawing, entitle, heat_map, panels
@@ -29,7 +28,7 @@ from softstart.views.numbers import (
     units_of,
 )
 from softstart.views.sheet import Sheet, Writer, columns_file
-from softstart.views.starts import machine_lines
+from softstart.views.starts import hertz, machine_lines
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -237,8 +236,9 @@ def conclusions(tuning: Tuning) -> list[str]:
         )
         if one.ends is not None:
             end = "stiff" if one.ends[0] >= one.ends[1] else "soft"
+            drives = (tuning.problem.drive, tuning.problem.soft)
             ends = " and ".join(
-                f"{_digits(worst)} at {at:g} Hz" for at, worst in zip(BAND[::-1], one.ends, strict=True)
+                f"{_digits(worst)} at {hertz(at)} Hz" for at, worst in zip(drives, one.ends, strict=True)
             )
             sentences.append(f"One set at both ends of the stiffness: {ends}. The {end} end is critical.")
     if tuning.problem.metric == MARGIN:
@@ -294,8 +294,8 @@ def tuning_notes(tuning: Tuning) -> list[str]:
     if q.soft is not None:
         notes.append(
             Sentence(
-                f"No stiffness is known. Gains are set up for an elastic frequency of {BAND[1]:g} Hz, the "
-                f"stiff end of the usual range, and evaluated there and at {BAND[0]:g} Hz.",
+                f"No stiffness is known. Gains are set up for an elastic frequency of {hertz(q.drive)} Hz, "
+                f"the stiff end of its range, and evaluated there and at {hertz(q.soft)} Hz.",
                 "When it is known, give shaft.elastic_frequency or a stiffness, and tune again.",
             )
         )

@@ -324,7 +324,8 @@ def test_init_says_how_the_choice_depends_on_an_unknown_stiffness(run):
     assert code == 0
     assert "softstart: For both ends: Pareto-optimal" in err
     assert "mine.toml is written: load " in out
-    assert "What next: softstart compare sheet.toml" in " ".join(out.split())  # which has both ends
+    assert "What next: softstart compare mine.toml" in " ".join(out.split())
+    assert float(Drive.load("mine.toml").soft.Omega) == pytest.approx(6.0 * math.pi, rel=1e-4)  # 3 Hz
     assert Drive.load("mine.toml").assumed.startswith("elastic frequency 30 Hz")
 
 
@@ -334,5 +335,5 @@ def test_a_report_says_how_the_choice_depends_on_an_unknown_stiffness(run, place
     found = run("report", "sheet.toml", "--controllers", "direct,ramp", "--budget", "0", "--out", "r.html")
     assert "No stiffness is known." in found.out
     text = (place / "r.html").read_text()
-    assert "Strategies are set up for the stiff end of what is usual" in text
+    assert "Strategies are set up for the stiff end, elastic frequency 30 Hz" in text
     assert "The choice" in text

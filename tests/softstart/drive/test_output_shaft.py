@@ -32,12 +32,13 @@ BY_HAND = {
     "load.torque": (1, 1), "load.friction": (1, 1), "load.viscous_friction": (2, 1),
     "start.target_speed": (-1, 0), "start.position": (-1, 0), "start.initial_speed": (-1, 0),
     "start.initial_load_speed": (-1, 0), "limits.shaft_torque": (1, 1), "limits.fatigue.torque": (1, 1),
+    "shaft.soft_stiffness": (2, 1),
 }  # fmt: skip
 AT_MOTOR = {  # of a drive, in SI
     "shaft.stiffness": 400.0, "shaft.damping": 0.2, "shaft.gap": 0.3, "load.inertia": 0.2, "load.torque": 9.0,
     "load.friction": 2.0, "load.viscous_friction": 0.01, "start.target_speed": 90.0, "start.position": 0.1,
     "start.initial_speed": 4.0, "start.initial_load_speed": 3.0, "limits.shaft_torque": 130.0,
-    "limits.fatigue.torque": 80.0,
+    "limits.fatigue.torque": 80.0, "shaft.soft_stiffness": 90.0,
 }  # fmt: skip
 ratios = st.floats(math.log(0.05), math.log(500.0)).map(lambda x: float(f"{math.exp(x):.4g}"))
 efficiencies = st.floats(0.3, 1.0).map(lambda x: float(f"{x:.3g}"))

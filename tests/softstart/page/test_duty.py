@@ -190,7 +190,6 @@ def test_the_duty_of_a_file_is_shown_saved_and_travels_in_the_link(machine):
     session = Session(machine.replace(duty=own))
     assert session.inputs.machine == machine
     assert session.inputs.machine_with_duty == machine.replace(duty=own)
-    assert session.inputs.both_ends_with_duty == machine.replace(duty=own)  # of the report
     other = inputs_of(link_of(session.inputs), Session().inputs)
     assert other.duty == session.inputs.duty == DutyPlan(own.steps)
     session.load(CONVEYOR)

@@ -174,17 +174,17 @@ def test_a_data_sheet_without_stiffness_is_loaded_with_both_its_ends(client, mon
     text = """load = { machine = "rotor", inertia = "160 kg*m^2", friction = "80 N*m" }
     motor = { rated_power = "3 kW", rated_speed = "1410 rpm", inertia = "0.0062 kg*m^2" }
     gear = { ratio = 38.1, backlash = "9 arcmin" }"""
-    ends = machine_of(text, "sheet.toml")
-    assert [one.Omega / math.tau for one in ends] == pytest.approx([30.0, 3.0], rel=1e-12)
+    drive = machine_of(text, "sheet.toml")
+    assert [one.Omega / math.tau for one in (drive, drive.soft)] == pytest.approx([30.0, 3.0], rel=1e-12)
     session = Session(controllers=["direct"])
     with client:
         panel = DataSheetPanel(session, "A")
         monkeypatch.setattr(panel, "sheet", lambda: DataSheet.from_toml(text))
         panel._use()
-        assert session.inputs.both_ends == ends
+        assert session.inputs.machine_in_units == drive
         tuning, checks = panels.TuningPanel(session, "A", Queue()), panels.ChecksPanel(session, "A", Queue())
-        assert ends in tuning.task()
-        assert ends in checks.task()
+        assert drive in tuning.task()
+        assert drive in checks.task()
 
 
 def test_a_decimal_comma_in_a_list_is_read_or_refused_and_never_two_values() -> None:

@@ -90,7 +90,7 @@ def test_what_is_saved_is_what_is_opened(drive: Any, knots: Any, time: float, no
     project = project.with_part(optimum)
     again = moved(project)
     assert again == project
-    assert again.loaded() == drive
+    assert again.single() == drive
     found: Any = again.controller("robust")
     assert (found.nominal, found.controller.time, found.name) == (drive, time, "ramp (robust)")
     assert (found.gaps, found.load_inertias) == ((0.5, 1.0), (time,))
