@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tests.page.conftest import SOFTSTART
 
-from softstart import DataSheet, Report, report
+from softstart import DataSheet, Drive, Duty, Report, report
 from softstart.reporting.printing import browser_that_prints, printed
 from softstart.views.numbers import seen_at
 
@@ -38,6 +38,9 @@ REPORTS = {
     "at the output": lambda: report(seen_at(travel(), "output"), budget=0.0),
     "side by side": lambda: of_travel(beside=travel().replace(gap="15 deg", name="worn")),
     "no limits": lambda: report("crane-4amtkf", budget=0.0),
+    "duty": lambda: report(
+        Drive.load("conveyor-11kw").replace(permissible_torque=150.0, duty=Duty.load("conveyor")), budget=0.0
+    ),
     "chain": lambda: report("crane-4-mass", controllers=[*THREE, "take-up"], budget=0.0),
 }
 

@@ -79,7 +79,7 @@ FUNCTIONS = {
 _BEFORE_UNIT = re.compile(
     r"(?<=[\d,]) (?=(?:k?N\xa0m|kg\xa0m|lbf|ms|s|rad|deg|arcmin|rpm|mm|Hz|kW|W|%)(?!\w))"
 )
-_KEY = re.compile(r"\b[a-z]+(?:_[a-z]+)+(?= \d)")  # of a parameter, before its value
+_KEY = re.compile(r"\b[a-z]+(?:_[a-z]+)+(?= \d| settles)")  # of a parameter, before its value
 _DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
 
 
