@@ -62,6 +62,17 @@ def test_the_page_has_no_serious_violation(visit: Callable[..., Any], axe: str) 
         if name == "Checks":
             page.get_by_test_id("checks-go").click()
             page.get_by_test_id("checks-answer").locator("figure, p").nth(3).wait_for(timeout=60_000)
+        if name == "Sheet":  # mistakes, then a drive with doubts
+            page.get_by_test_id("sheet-use").click()
+            page.get_by_test_id("sheet-trouble").locator(".trouble").first.wait_for()
+        if name == "Files":
+            page.get_by_test_id("project-names").click()
+            page.get_by_test_id("paste-text").fill("time,torque\n0,20\n100,62")
+            page.get_by_test_id("paste-add").click()
+            page.get_by_test_id("paste-trouble").locator(".trouble").first.wait_for()
+            page.locator('[data-path="shaft.gap"] input[type=text]').fill("9 rad")
+            page.keyboard.press("Enter")
+            page.locator(".doubt").first.wait_for()
         for colours in ("light", "dark"):
             page.emulate_media(color_scheme=colours)
             page.wait_for_function(

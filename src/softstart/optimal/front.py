@@ -281,7 +281,7 @@ def pareto(
     times = None if start_times is None else _seconds(start_times, drive, torque_speed)
     names = ready_controller_names() if controllers is None else controllers
     made = [as_controller(one) for one in names]
-    target = None if save_to is None else Target("save_to", Path(save_to), "limit curve")
+    target = None if save_to is None else Target("save_to", Path(save_to), "Pareto curve")
     runs = [simulate(drive, one, base=base) for one in made]
     paths = {end: StartPath(replace(problem, terminal=end)) for end in (terminal, COMPARISON_TERMINAL)}
     if times is None:

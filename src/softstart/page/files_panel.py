@@ -21,7 +21,7 @@ from softstart.page.downloads import (
     shipped_drives,
     written_text,
 )
-from softstart.page.job_panel import JobPanel, Task
+from softstart.page.job_panel import JobPanel, Task, starts_seconds
 from softstart.page.panel_parts import (
     POLL,
     Troubles,
@@ -230,7 +230,7 @@ class BesidePanel(JobPanel):
 
     def estimate(self) -> float:
         """Two comparisons."""
-        return 4.0
+        return starts_seconds(self.session.inputs.machine)
 
 
 class Exports:
@@ -293,7 +293,7 @@ class ParameterSheetPanel(JobPanel):
 
     def estimate(self) -> float:
         """Some starts."""
-        return 2.0
+        return 1.0
 
 
 class ProgramPanel(JobPanel):
@@ -328,7 +328,7 @@ class ProgramPanel(JobPanel):
 
     def estimate(self) -> float:
         """Translation and some starts in cycles."""
-        return 5.0
+        return 1.0
 
 
 class ReportPanel(JobPanel):
@@ -367,8 +367,8 @@ class ReportPanel(JobPanel):
         )
 
     def estimate(self) -> float:
-        """Mostly its budget for maps and limits."""
-        return 30.0
+        """Its budget for optima, `reporting.result.BUDGET`, and the starts."""
+        return 22.0 if len(self.session.inputs.machine.shaft_names) == 1 else 65.0
 
 
 def command_line(session: Session, user: Hashable) -> None:

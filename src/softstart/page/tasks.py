@@ -1,4 +1,4 @@
-"""What the page computes in the background: optimal start, limit, checks, tuning, identification, report.
+"""What the page computes in the background: optimum, Pareto curve, checks, tuning, identification, report.
 
 Each function runs in a process of its own (`softstart.page.jobs`), says how far it is through `progress`, and
 gives back plain data.
@@ -136,9 +136,9 @@ def curve(
             progress(min(done / total, 1.0), f"start in {within.removesuffix(f', {terminal}')}")
             done += 1
 
-    limit = front.pareto(drive, terminal=terminal, controllers=controllers, progress=doing)
-    name = file_name(drive.name, "limit", suffix=".csv")
-    return TaskResult(shown(limit.sheet, first=True), {name: written_text(limit.to_csv, ".csv")})
+    found = front.pareto(drive, terminal=terminal, controllers=controllers, progress=doing)
+    name = file_name(drive.name, "pareto", suffix=".csv")
+    return TaskResult(shown(found.sheet, first=True), {name: written_text(found.to_csv, ".csv")})
 
 
 def beside_task(

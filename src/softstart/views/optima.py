@@ -274,12 +274,10 @@ def optimum_figure(best: Optimum) -> Figure:
     def motor(axes: Axes, run: Run) -> None:
         least, most = problem.lowest_torque, problem.highest_torque
         for limit in (least, most):
-            axes.axhline(
-                torque(limit), color=COLOURS[3], lw=1.0, ls=DASHES[1], label="limits" if limit else None
-            )
+            axes.axhline(torque(limit), color=LIMIT, lw=1.0, ls=DASHES[1], label="limits" if limit else None)
         if problem.torque_speed:
             at_speed = np.interp(run.w1, *np.array(problem.torque_speed).T)
-            axes.plot(run.t, torque(at_speed), color=COLOURS[3], lw=1.0, ls=":", label="limit at w1")
+            axes.plot(run.t, torque(at_speed), color=LIMIT, lw=1.0, ls=":", label="limit at w1")
         axes.plot(run.t, torque(run.u), color=COLOURS[1], label="realised u")
         inside = best.profile.time <= run.end_time
         times = np.append(best.profile.time[inside], run.end_time)
@@ -313,7 +311,7 @@ def optimum_figure(best: Optimum) -> Figure:
     def speed(axes: Axes, run: Run) -> None:
         speeds(axes, run)
         if problem.start_time is not None and best.kept is None:
-            axes.axvline(problem.start_time, color=COLOURS[3], lw=1.0, ls=DASHES[1], label="allowed")
+            axes.axvline(problem.start_time, color=LIMIT, lw=1.0, ls=DASHES[1], label="allowed")
 
     objective = "minimum start time within limits" if _by_limits(best) else _objective(best)
     title = f"{best.run.drive.name}: {objective}, terminal {problem.terminal}, {best.method}"

@@ -176,7 +176,7 @@ def test_points_of_other_inputs_are_refused_and_kept(
     kept = tmp_path / "front.sqlite"
     kept.write_bytes(kept_point)
     options: dict[str, Any] = {"drive": CRANE, "controllers": [], "save_to": kept}
-    with pytest.raises(InputError, match=f"contains a limit curve with another {names}; ") as refused:
+    with pytest.raises(InputError, match=f"contains a Pareto curve with another {names}; ") as refused:
         pareto(start_times=[0.32], **options | change)
     assert len(refused.value.sentences) == 1
     assert kept.read_bytes() == kept_point

@@ -93,13 +93,43 @@ def test_a_panel_tells_beforehand_how_long_it_takes(client: Any, monkeypatch: py
 
     monkeypatch.setattr(JobPanel, "took", {})
     panel = panel_of(Queue())
-    assert panel.takes() == "Takes about 20 s; can be cancelled."
+    assert panel.takes() == "Takes 20 s to 40 s; can be cancelled."
     panel.start()
     assert panel._takes.text == ""  # its state says how long it has taken
     monkeypatch.setattr(Hasty, "seconds", 30.0)
     panel.job.end()
     panel.refresh()
     assert panel.takes() == "Takes about 30 s; can be cancelled."
+
+
+# seconds of a processor (Xeon of 2020) that the tasks took; the tractor has 15 masses
+MEASURED = {
+    "OptimumPanel": {"crane-4amtkf": 0.42, "hoist-15kw": 0.92, "conveyor-11kw": 1.42,
+                     "nordin-servo-60kw": 2.24, "servo-axis-small": 2.24,
+                     "crane-4amtkf-light": 3.85, "crane-4amtkf-worn": 7.43,
+                     "crane-4amtkf-light-worn": 9.54, "long-travel-3kw": 9.37, "crane-4-mass": 46.8},
+    "ParetoPanel": {"crane-4amtkf": 7.4, "hoist-15kw": 11.5, "conveyor-11kw": 18.2},
+    "ChecksPanel": {"nordin-servo-60kw": 0.7, "long-travel-3kw": 0.7, "tractor-like": 7.5},
+    "TuningPanel": {"conveyor-11kw": 3.0 * 1.09 * 12.0, "crane-4amtkf": 3.0 * 1.12 * 12.0},
+    "BesidePanel": {"long-travel-3kw": 0.7, "tractor-like": 5.4},
+    "ParameterSheetPanel": {"long-travel-3kw": 0.95, "tractor-like": 1.3},
+    "ProgramPanel": {"crane-4amtkf": 0.65, "long-travel-3kw": 1.08},
+    "LogPanel": {"conveyor-11kw": 2.1, "long-travel-3kw": 2.2},
+    "ReportPanel": {"crane-4amtkf": 22.0, "hoist-15kw": 24.0, "conveyor-11kw": 29.0},  # of a clock
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MEASURED)
+def test_the_time_that_is_told_is_that_of_shipped_machines(client: Any, name: str) -> None:
+    from softstart.page import files_panel, panels
+
+    kind = getattr(panels, name, None) or getattr(files_panel, name)
+    for machine, seconds in MEASURED[name].items():
+        with client:
+            least, most = (
+                kind(Session(machine, ["direct"]), "A", Queue()).estimate() * one for one in kind.spread
+            )
+        assert max(least, 1.0) <= max(seconds, 1.0) <= max(most, 1.0), machine
 
 
 @pytest.mark.parametrize("looks", [1, 2, 3, 4, 5])

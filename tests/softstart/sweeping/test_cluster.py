@@ -1,4 +1,4 @@
-"""Sweeps, tunings and limit curves on a dask cluster: a real scheduler and workers, one of them killed."""
+"""Sweeps, tunings and Pareto curves on a dask cluster: a real scheduler and workers, one of them killed."""
 
 from __future__ import annotations
 
