@@ -7,6 +7,8 @@ import math
 import pytest
 
 from softstart import Chain, Drive, InputError, compare, report, side_by_side, simulate
+from softstart.views.drawing import strategy_colours
+from softstart.views.traces import comparison_figure
 
 CRANE = Drive.load("crane-4amtkf")
 NAMES = ["direct", "ramp", "s-curve"]
@@ -51,6 +53,25 @@ def test_the_figure_shows_both() -> None:
     assert {(row.run.settled_time, row.run.k_dyn) for pair in both.pairs for row in pair} <= drawn | {
         tuple(map(float, point)) for mark in axes.collections for point in mark.get_offsets()
     }
+
+
+def test_a_strategy_has_one_colour_and_mark_in_all_figures() -> None:
+    colours = {name: strategy_colours([name])[name][0] for name in NAMES}
+    assert len(set(colours.values())) == len(NAMES)
+    both = side_by_side(CRANE, "conveyor-11kw", NAMES)
+    (axes,) = next(iter(both.figures.values()))().axes
+    marks = {tuple(map(float, one.get_xydata()[0])): one for one in axes.lines if len(one.get_xydata()) == 1}
+    for pair in both.pairs:
+        new, other = (marks[row.run.settled_time, row.run.k_dyn] for row in pair)
+        assert new.get_color() == other.get_color() == colours[pair[0].name]
+        assert new.get_marker() == other.get_marker()
+        assert other.get_markerfacecolor() == "none" != new.get_markerfacecolor()
+    rows = both.first.rows
+    panels = [*comparison_figure(rows).axes, *(row.run.plot().axes[0] for row in rows)]
+    for row, panel in zip((*rows, *rows), panels, strict=True):
+        lines = {line.get_label(): line.get_color() for line in panel.lines}
+        assert lines["shaft torque T"] == colours[row.name]
+        assert lines["motor torque u"] == "#000000"
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from softstart.chain.machines import as_machine, quantity_of, refuse_other_kind
+from softstart.chain.machines import quantity_of, refuse_other_kind
 from softstart.errors import InputError
 from softstart.results import Result
 from softstart.start.comparison import Comparison, as_far_as_known, compare, make_controllers
@@ -101,7 +101,7 @@ def side_by_side(
     ----------
     K_dyn: [G] (16).
     """
-    machine = as_machine(as_far_as_known(first, 1)[0], "first")
+    machine = as_far_as_known(first, 1, "first")[0]
     if (second is None) == (worn_gap is None):
         raise InputError("second: give another machine or the gap after wear (worn_gap), one of the two.")
     if worn_gap is not None:
@@ -110,7 +110,7 @@ def side_by_side(
             reason = f"wear widens the gap; give one above that of the machine, {own:.6g} rad"
             raise InputError(f"worn_gap = {worn_gap}: {reason}.")
         second = machine.with_gap_and_inertia(gap, inertia)
-    refuse_other_kind(machine, as_machine(as_far_as_known(second, 1)[0], "second"), "second")
+    refuse_other_kind(machine, as_far_as_known(second, 1, "second")[0], "second")
     made = make_controllers(controllers, options.pop("parameters", None) or {})
     nominal = machine if worn_gap is not None else None
     return SideBySide(

@@ -419,13 +419,18 @@ def set_for_limits(
     return tuple(found), tuple(tried)
 
 
-def as_far_as_known(drive: Any, count: int = 200) -> tuple[Any, MachineTable | None, Drive | None]:
-    """The machine itself, `count` drives where it is known within intervals, and that of the soft end."""
+def as_far_as_known(
+    drive: Any, count: int = 200, name: str = "drive"
+) -> tuple[Any, MachineTable | None, Drive | None]:
+    """The machine itself, `count` drives where it is known within intervals, and that of the soft end.
+
+    `name` is the argument's.
+    """
     if isinstance(drive, DataSheet):
         drive = drive.drive
     if isinstance(drive, Uncertain):
         return drive.drive, drive.draws(count), None
-    drive = as_machine(drive)
+    drive = as_machine(drive, name)
     return drive, None, drive.soft if isinstance(drive, Drive) else None
 
 
