@@ -154,6 +154,23 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     assert (name, content.decode()) == ("gantry.toml", sheet.drive_toml())
 
 
+def test_of_a_drive_without_stiffness_all_columns_are_in_sight(visit: Any) -> None:
+    """Those of both ends, and verdicts; the recommendation and the hint of the box to paste are whole."""
+    page = visit(width=1280, height=800)
+    page.get_by_role("tab", name="Files", exact=True).click()
+    given = SHEET | {"load.machine": "travel", "limits.output_torque": "1.6 kN*m"}
+    sheet = DataSheet.from_settings({key: given[key] for key in given if key != "gear.stiffness"})
+    put(page, "sheet.toml", sheet.to_toml().encode())
+    page.locator(".strategies table.ends.held").wait_for()
+    at_rest(page)
+    whole = "e => [e.scrollWidth - e.clientWidth <= 1, e.scrollHeight - e.clientHeight <= 1]"
+    comes_to(lambda: page.locator(".strategies").evaluate(whole)[0], True)
+    assert page.locator(".strategies .flag").first.is_visible()
+    assert page.get_by_test_id("paste-text").evaluate(whole) == [True, True]
+    page.set_viewport_size({"width": 768, "height": 1024})
+    comes_to(lambda: page.locator(".advice").evaluate(whole), [True, True])
+
+
 def test_the_parameter_sheet_is_copied_as_a_text(visit: Any) -> None:
     """For the selected strategy; as a file it is the same text."""
     page = visit(select="s-curve", permissions=["clipboard-read", "clipboard-write"])
