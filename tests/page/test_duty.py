@@ -179,3 +179,24 @@ def test_the_duty_has_no_serious_violation_and_fits(visit, conveyor, axe, size):
         )
         page.wait_for_function(STILL)
         assert violations(page, axe) == []
+
+
+def test_the_duty_at_the_output_names_its_units_in_heads_facts_and_trace(page):
+    """As the switch says: the torque i eta times that of the motor shaft, in the unit of the page."""
+    run = run_duty(CONVEYOR, "direct", PLAIN)
+    page.locator("details:has(summary:text('Gear')) summary").click()
+    for path, text in (("gear.ratio", "31.5"), ("units", "deg, rpm, kN m")):
+        field = page.locator(f"[data-path='{path}'] input")
+        field.fill(text)
+        field.press("Enter")
+        answered(page)
+    page.locator('.shaft input[value="output"]').check(force=True)
+    comes_to(lambda: page.locator(".duty-table thead th").all_inner_texts()[3], "largest\nkN m")
+    page.wait_for_function(f"{DUTY}.view.at === ', at the output' && {DUTY}.view.trace")
+    cell = page.locator(".duty-table tbody tr").nth(run.worst.number - 1).locator("td").nth(2).inner_text()
+    assert float(cell) == pytest.approx(31.5 * run.worst.peak_torque / 1000.0, rel=5.1e-4)
+    assert "kN m" in page.locator(".duty-k").locator("xpath=ancestor::*[3]").inner_text()
+    trace = page.evaluate(f"{DUTY}.plot.csv({DUTY}.view)").splitlines()[0]
+    assert trace.startswith("step,do,time_in_step_s,motor_torque_kNm_at_output,")
+    drawn(page)
+    assert page.evaluate(INK) > 5

@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -113,16 +114,29 @@ def test_multiples_lists_and_what_is_at_output_already_stay_as_typed() -> None:
 
 
 def test_a_figure_of_a_start_is_at_the_output() -> None:
-    """Axes and data of the figure, against the traces through the gear."""
-    from softstart import simulate
+    """Axes and data of the figure, against the traces through the gear; torques of either sign alike.
+
+    The line of the limit is at what the data sheet says, and as far from the peak as the margin says.
+    """
+    from softstart import TorqueProfile, simulate
+    from softstart.start.recommendation import margins_of
     from softstart.views.traces import run_figure
 
-    drive = CRANE.replace(gear_ratio=38.1, gear_efficiency=0.95, units="arcmin, rpm, kN m, at output")
-    run = simulate(drive, "ramp")
+    drive = CRANE.replace(
+        gear_ratio=38.1, gear_efficiency=0.95, units="arcmin, rpm, kN m, at output", damping=0.3,
+        permissible_output_torque=6400.0, minimum_torque=-50.0,
+    )  # fmt: skip
+    brakes = TorqueProfile([0.0, 0.3, 0.3, 0.6], [62.0, 62.0, -50.0, -50.0])
+    run = simulate(drive, "profile", parameters={"profile": brakes}, until=0.6)
+    assert run.T.min() < -1.0 < 1.0 < run.T.max()
     figure = run_figure(run)
     torque, speed, twist = figure.axes
     assert figure.get_suptitle().endswith(", at the output")
     assert [panel.get_ylabel() for panel in figure.axes] == ["torque, kN m", "speed, rpm", "twist, arcmin"]
-    assert torque.lines[1].get_ydata() == pytest.approx(GEAR.to_output(run.T, "N*m") / 1000.0, rel=1e-12)
+    lines = {line.get_label(): np.asarray(line.get_ydata()) for line in torque.lines}
+    assert torque.lines[1].get_ydata() == pytest.approx(38.1 * 0.95 * run.T / 1000.0, rel=1e-12)
+    assert lines["permissible"] == pytest.approx([6.4, 6.4], rel=1e-12)
+    (margin,) = (one for one in margins_of(run) if one.name == "output torque")
+    assert 1.0 - np.abs(torque.lines[1].get_ydata()).max() / 6.4 == pytest.approx(margin.share, abs=1e-3)
     assert speed.lines[1].get_ydata() == pytest.approx(run.w2 / 38.1 * 30.0 / math.pi, rel=1e-12)
     assert twist.lines[0].get_ydata() == pytest.approx(run.twist[:, 0] / 38.1 * 10800.0 / math.pi, rel=1e-12)

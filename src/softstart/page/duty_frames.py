@@ -15,6 +15,7 @@ from softstart.errors import InputError
 from softstart.page.duty import KINDS
 from softstart.quantities import Units
 from softstart.views.duties import against_limits, headline, how_of, life_conclusion, life_or_reason
+from softstart.views.numbers import unit
 
 if TYPE_CHECKING:
     from softstart.page.session import DutyResult, Inputs
@@ -36,7 +37,7 @@ def json_number(value: float) -> float | None:
 
 def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
     """The strip of steps with the figures of each, and their trace; `result` is None until it is computed."""
-    plan, units = inputs.plan, inputs.units.at_motor
+    plan, units = inputs.plan, inputs.units
     view: Frame = {
         "kinds": dict(KINDS),
         "selected": step,
@@ -44,8 +45,8 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
         "waits": result is None,
         "trouble": "" if result is None else result.trouble,
         "strategy": inputs.selected,
-        "units": {name: units.of(si) for name, si in (("angle", "rad"), ("speed", "rad/s"))},
-        "at": ", at the motor" if inputs.units.gear else "",
+        "units": {"angle": units.of("rad"), "speed": units.of("rad/s"), "torque": unit(units.of("N*m"))},
+        "at": units.at,
         "trace": None,
         "toml": "",
     }
@@ -63,8 +64,8 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
         "wrong": None,
         "worst": run.worst.number - 1,
         "k_dyn": json_number(run.k_dyn),
-        "peak_torque": json_number(run.worst.peak_torque),
-        "base": json_number(run.base_torque),
+        "peak_torque": json_number(float(units.shown(run.worst.peak_torque, "N*m"))),
+        "base": json_number(float(units.shown(run.base_torque, "N*m"))),
         "cycle_time": json_number(run.cycle_time),
         "cycles": run.cycles,
         "repeated": run.repeated,
@@ -77,7 +78,10 @@ def step_figures(run: DutyRun, row: StepRun, units: Units, shares: Vector | None
     """The figures of one step, as it was carried out with the largest torque; `shares` of the damage, %."""
     margins = run.margins_of(row)
     none = NOISE * run.base_torque
-    largest, smallest = (0.0 if abs(T) < none else float(T) for T in (row.largest.max(), row.smallest.min()))
+    largest, smallest = (
+        0.0 if abs(T) < none else float(units.shown(T, "N*m"))
+        for T in (row.largest.max(), row.smallest.min())
+    )
     return {
         "length": row.end - row.begin,
         "how": how_of(run, row),
@@ -101,8 +105,8 @@ def step_figures(run: DutyRun, row: StepRun, units: Units, shares: Vector | None
 def trace_of(run: DutyRun, units: Units) -> Frame:
     """The steps one after the other, each as it was carried out with the largest torque.
 
-    `t` is in s from the begin of each step; `ends` says where in the channels each step ends. Torques in N m,
-    speeds in the units of the page, in single precision.
+    `t` is in s from the begin of each step; `ends` says where in the channels each step ends. Torques and
+    speeds in the units of the page and at its shaft, in single precision.
     """
     shaft = int(run.worst.peak_torques.argmax())
     machine = run.drive
@@ -111,8 +115,11 @@ def trace_of(run: DutyRun, units: Units) -> Frame:
     data = np.concatenate(parts, axis=1)
     masses = len(machine.mass_names)
     data[2 : 2 + masses] = units.shown(data[2 : 2 + masses], "rad/s")
+    for torques in (data[1:2], data[2 + masses :]):
+        torques[:] = units.shown(torques, "N*m")
     names = ["t", "u", *(f"w[{k}]" for k in range(masses)), *(f"T[{k}]" for k in range(masses - 1))]
-    allowed = machine.permissible_torques
+    allowed = units.shown(machine.permissible_torques, "N*m")
+    number, peak = peak_of(run.worst, shaft)
     return {
         "channels": names,
         "data": b64encode(data.astype("<f4").tobytes()).decode("ascii"),
@@ -122,7 +129,7 @@ def trace_of(run: DutyRun, units: Units) -> Frame:
         "load": int(machine.load_index),
         "shafts": list(machine.shaft_names),
         "allowed": json_number(float(allowed[shaft])),
-        "peak": peak_of(run.worst, shaft),
+        "peak": (number, float(units.shown(peak, "N*m"))),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64decode
 
 import numpy as np
@@ -216,3 +217,35 @@ def test_a_chain_shows_all_its_shafts():
     run = run_duty(chain, "direct", page.session.inputs.plan.duty)
     assert shown["trace"]["worst"] == int(run.worst.peak_torques.argmax())
     assert page.session.inputs.plan.added(1, "load", chain).steps[1].torque == chain.masses[-1].torque
+
+
+@pytest.mark.parametrize(("ratio", "eta"), [(31.5, 0.94), (0.5, 0.7), (1.0, 1.0)])
+def test_a_duty_is_seen_at_the_output(page, ratio, eta):
+    """Torques i eta, speeds and angles over i; K_dyn, times and margins are the same at both shafts."""
+    for path, value in (("gear.ratio", ratio), ("gear.efficiency", eta), ("limits.shaft_torque", 300.0)):
+        page.session.set(path, value)
+    page.session.set("units", "rad, rad/s, kN m")
+    motor = page.duty()
+    page.take("show_at", output=True)
+    output = page.duty()
+    assert (motor["at"], output["at"], output["units"]["torque"]) == ("", ", at the output", "kN m")
+    for one, other in zip(motor["steps"], output["steps"], strict=True):
+        for key in ("largest", "smallest"):
+            assert other[key] == pytest.approx(one[key] * ratio * eta, rel=1e-12, abs=1e-12)
+        assert other["angle"] == pytest.approx(one["angle"] / ratio, rel=1e-12)
+        alike = ("k_dyn", "time", "contacts", "impact_energy", "damage", "kept")
+        assert [other[key] for key in alike] == [one[key] for key in alike]
+        assert re.findall(r"[\d.]+ %", other["limits"]) == re.findall(r"[\d.]+ %", one["limits"])
+    for key in ("peak_torque", "base"):
+        assert output[key] == pytest.approx(motor[key] * ratio * eta, rel=1e-12)
+    assert output["trace"]["allowed"] == pytest.approx(0.3 * ratio * eta, rel=1e-12)
+    assert output["trace"]["peak"][1] == pytest.approx(motor["trace"]["peak"][1] * ratio * eta, rel=1e-12)
+    for name, here, there in zip(motor["trace"]["channels"], *map(rows_of, (motor, output)), strict=True):
+        factor = {"t": 1.0, "w": 1.0 / ratio}.get(name[0], ratio * eta)
+        assert there == pytest.approx(factor * here, rel=1e-6, abs=1e-9)
+
+
+def rows_of(shown):
+    """The channels of the trace."""
+    trace = shown["trace"]
+    return np.frombuffer(b64decode(trace["data"]), dtype="<f4").reshape(len(trace["channels"]), -1)

@@ -1,5 +1,5 @@
 // The duty: a strip of steps that are added, moved and drawn longer by hand, their trace below, a table of them.
-import { DutyPlot, LEFT, RIGHT } from "./duty_plot.js";
+import { DutyPlot, LEFT, RIGHT, headings } from "./duty_plot.js";
 import { button, element, fixed, put, significant } from "./numbers.js";
 
 const NARROWEST = 53; // px of a step, where there is room
@@ -47,7 +47,7 @@ export class Duty {
     this.note = element("p", { class: "duty-note" });
     this.refused = element("p", { class: "duty-note wrong", role: "alert", hidden: true });
     this.body = element("tbody");
-    const heads = COLUMNS.map(([text, meaning, , kind]) => element("th", { scope: "col", class: kind ?? "number", title: meaning }, text === "K" ? "K" : text, ...(text === "K" ? [element("sub", {}, "dyn")] : [])));
+    const heads = this.heads = COLUMNS.map(([text, meaning, , kind]) => element("th", { scope: "col", class: kind ?? "number", title: meaning }, text === "K" ? "K" : text, ...(text === "K" ? [element("sub", {}, "dyn")] : [])));
     const table = element("table", { "aria-label": "Steps" }, element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "step"), ...heads)), this.body);
     this.trace = element("div", { class: "duty-trace" }, this.canvas, this.status);
     place.append(this.bar, this.strip, this.trace, this.refused, element("div", { class: "duty-table" }, table));
@@ -85,7 +85,11 @@ export class Duty {
     put(this.value, view.trace ? fixed(view.k_dyn, 3) : "\u2013");
     this.value.dataset.value = view.k_dyn ?? "";
     this.value.classList.toggle("none", !view.trace);
-    FACTS.forEach(([, , text], index) => put(this.facts[index].children[1], text(view)));
+    FACTS.forEach(([, unit, text], index) => {
+      put(this.facts[index].children[1], text(view));
+      put(this.facts[index].children[2], unit.replace("N m", view.units.torque));
+    });
+    this.heads.forEach((head, index) => COLUMNS[index][0].endsWith("N m") && put(head, COLUMNS[index][0].replace("N m", view.units.torque)));
     this.files.forEach((file, index) => (file.disabled = index ? !view.trace : !view.toml));
     put(this.note, [...(view.notes ?? []), "Each step as it was carried out with the largest torque of all cycles and repetitions; short ones are drawn wider."].join(" "));
     this.note.hidden = !view.trace;
@@ -343,8 +347,8 @@ export class Duty {
 
   csv() {
     const quoted = (text) => `"${String(text ?? "").replaceAll('"', '""')}"`;
-    const { angle } = this.view.units;
-    const columns = [["step", (s, i) => i + 1], ["do", (s) => quoted(s.do)], ["repeat", (s) => s.repeat], ["how", (s) => quoted(s.how)], ["k_dyn", (s) => s.k_dyn], ["largest_torque_Nm", (s) => s.largest], ["smallest_torque_Nm", (s) => s.smallest], ["contacts", (s) => s.contacts], ["impact_energy_J", (s) => s.impact_energy], ["damage_percent", (s) => s.damage], ["time_s", (s) => s.time], ["start_time_s", (s) => s.start_time], [`angle_${angle}`, (s) => s.angle], ["limits", (s) => quoted(s.limits)]];
+    const [angle, torque] = headings(this.view);
+    const columns = [["step", (s, i) => i + 1], ["do", (s) => quoted(s.do)], ["repeat", (s) => s.repeat], ["how", (s) => quoted(s.how)], ["k_dyn", (s) => s.k_dyn], [`largest_torque_${torque}`, (s) => s.largest], [`smallest_torque_${torque}`, (s) => s.smallest], ["contacts", (s) => s.contacts], ["impact_energy_J", (s) => s.impact_energy], ["damage_percent", (s) => s.damage], ["time_s", (s) => s.time], ["start_time_s", (s) => s.start_time], [`angle_${angle}`, (s) => s.angle], ["limits", (s) => quoted(s.limits)]];
     const lines = this.view.steps.map((step, index) => columns.map(([, value]) => value(step, index) ?? "").join(","));
     return `${[columns.map(([head]) => head).join(","), ...lines].join("\n")}\n`;
   }

@@ -7,6 +7,11 @@ const TOP = 20, BOTTOM = 8, AXIS = 22, BETWEEN = 24; // below: with an axis of t
 const SHARES = [0.64, 0.36];
 const DASHED = [5, 3];
 
+// units of angle, torque and speed in the headings of a file
+export function headings({ units, at }) {
+  return [units.angle, units.torque, units.speed].map((unit) => unit.replace("/", "_").replaceAll(/\W/g, "") + (at && "_at_output"));
+}
+
 // channels of all steps, and of each step where they begin and end
 function unpack(trace) {
   if (!trace.data) return;
@@ -171,7 +176,7 @@ export class DutyPlot {
     const { allowed } = trace;
     if (allowed && high > 0.5 * allowed) high = Math.max(high, 1.02 * allowed); // a limit far above says nothing
     if (allowed && low < -0.5 * allowed) low = Math.min(low, -1.02 * allowed);
-    this.frame(panel, [low, high], `Torque${this.view.at}`, "N m", [
+    this.frame(panel, [low, high], `Torque${view.at}`, view.units.torque, [
       ...(beside.length ? [["other shafts", this.own, [], 0.8]] : []),
       ...(allowed ? [["permissible", warn, [], 1]] : []),
       ["motor u", ink, DASHED, 1.2],
@@ -202,7 +207,7 @@ export class DutyPlot {
     pen.arc(px, py, 3.5, 0, 7);
     pen.fill();
     pen.stroke();
-    const text = `${index + 1} ${this.view.steps[index].do} ${significant(torque, 4)} N m`;
+    const text = `${index + 1} ${this.view.steps[index].do} ${significant(torque, 4)} ${this.view.units.torque}`;
     const wide = pen.measureText(text).width;
     const left = px + wide + 14 < LEFT + this.w ? px + 8 : px - 8 - wide;
     pen.globalAlpha = 0.7;
@@ -241,7 +246,7 @@ export class DutyPlot {
     const i = Math.min(from + indexAt(trace.t.subarray(from, to), t), to - 1);
     const said = (name, channel) => `${name} ${significant(trace[channel][i], 4)}`;
     const texts = [
-      `${place.index + 1} ${view.steps[place.index].do}   t ${significant(trace.t[i], 4)} s   ${said("T", `T[${trace.worst}]`)} N m   ${said("u", "u")} N m`,
+      `${place.index + 1} ${view.steps[place.index].do}   t ${significant(trace.t[i], 4)} s   ${said("T", `T[${trace.worst}]`)} ${view.units.torque}   ${said("u", "u")} ${view.units.torque}`,
       `${said("\u03c9\u2081", `w[${trace.motor}]`)}   ${said("\u03c9\u2082", `w[${trace.load}]`)} ${view.units.speed}`,
     ];
     panels.forEach((panel, row) => {
@@ -256,14 +261,15 @@ export class DutyPlot {
   }
 
   // the points of all steps
-  csv({ trace, steps, units }) {
+  csv(view) {
+    const { trace, steps, units, at } = view;
     unpack(trace);
-    const speed = units.speed.replace("/", "_");
+    const [, torque, speed] = headings(view);
     const quoted = (text) => `"${text.replaceAll('"', '""')}"`;
     const heads = trace.channels.slice(1).map((name) => {
       const k = Number(name.slice(2, -1));
-      if (name === "u") return "motor_torque_Nm";
-      return name.startsWith("T[") ? quoted(`T ${trace.shafts[k]} [N m]`) : quoted(`w[${k + 1}] [${speed}]`);
+      if (name === "u") return `motor_torque_${torque}`;
+      return name.startsWith("T[") ? quoted(`T ${trace.shafts[k]} [${units.torque}${at}]`) : quoted(`w[${k + 1}] [${speed}]`);
     });
     const lines = [["step", "do", "time_in_step_s", ...heads].join(",")];
     trace.spans.forEach(([from, to], index) => {
