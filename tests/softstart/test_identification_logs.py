@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.softstart.test_identification import GUESS, NAMES, REVERSE, TRUTH
 
-from softstart import InputError, Log, identify
+from softstart import InputError, Log, identify, simulate
 from softstart.identification.model import LogModel
 from softstart.identification.planning import simulated_log
 from softstart.identification.solving import _check_step
@@ -242,6 +242,18 @@ def test_the_unit_of_each_signal_does_not_matter(kind: str, data: st.DataObject,
     assert read.torque == pytest.approx(TORQUE, rel=1e-12)
     assert read.values == pytest.approx(SIGNALS[kind], rel=1e-12, abs=1e-12)
     assert read.notes == ()
+
+
+def test_the_traces_of_a_start_are_a_log(tmp_path: Path) -> None:
+    """Their T is the torque of the shaft beside t, a time; u and w1 are what an inverter has."""
+    run = simulate("crane-4amtkf", "ramp")
+    run.to_csv(tmp_path / "trace.csv")
+    read = Log.load(tmp_path / "trace.csv")
+    assert read.kind == "speed"
+    seen, at = np.isfinite(read.values), run.at(read.time)
+    assert seen.sum() > 700
+    assert read.values[seen] == pytest.approx(at["w1"][seen], abs=1e-9)
+    assert read.torque == pytest.approx(at["u"], abs=1e-9)
 
 
 def test_columns_between_spaces_that_nothing_names_or_measures_are_questions(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ SIGNALS: Final = {
     "time": Wanted(("time", "t"), "s"),
     "torque": Wanted(("torque", "u", "demand"), "N*m"),
     "angle": Wanted(("angle", "phi", "position"), "rad"),
-    "speed": Wanted(("speed", "w", "omega", "n"), "rad/s"),
+    "speed": Wanted(("speed", "w", "omega", "n", "w1", "n1"), "rad/s"),
 }
 MOTIONS: Final = {"angle": ("rad", "deg", "turn"), "speed": ("rad/s", "rpm", "deg/s", "turn/s")}
 FORM: Final = "time [ms];torque [N*m];speed [rpm]"
@@ -250,7 +250,9 @@ def _places(names: Sequence[str], wanted_columns: Mapping[str, WantedColumn]) ->
     for key, signal in SIGNALS.items():
         names_known = [wanted_columns[key].name] if key in wanted_columns else signal.names
         known = [name.lower() for name in names_known]
-        whole = [i for i, name in enumerate(names) if name.lower() in known]
+        # T is a torque beside t, a time, as in the traces of a start
+        whole = [i for i, name in enumerate(names) if name in names_known]
+        whole = whole or [i for i, name in enumerate(names) if name.lower() in known]
         places[key] = whole or [i for i, name in enumerate(names) if _tail(name)[0].lower() in known]
     motions = [key for key in ("angle", "speed") if key in wanted_columns]
     motions = motions or [key for key in ("angle", "speed") if places[key]]
