@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Hashable
 from contextlib import suppress
@@ -180,7 +181,7 @@ class JobPanel(ABC):
             self._jobs.show(self._user, self.name, None)
             self._box.set_visibility(False)
             self._result_box.set_visibility(False)  # it answers another question
-        self._troubles.say(error.sentences)
+        self._troubles.say([re.sub(r'^([A-Z][a-z ]+) = "', r'\1 "', one) for one in error.sentences])
 
     def cancel(self) -> None:
         """Stop the job."""

@@ -15,7 +15,7 @@ from softstart.page.session import Session
 from softstart.views.drawing import STRATEGIES
 from softstart.views.traces import trade_off_figure
 
-COLOURS = 12  # of strategies
+COLOURS = 13  # of strategies: the shipped ones and one more, as an optimum
 WEB = Path(softstart.page.__file__).parent / "web"
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, IEEE Trans. Visualization and Computer Graphics 15 (2009)
 # 1291-1298, table 1, severity 1.0: what is seen of linear RGB
