@@ -58,7 +58,7 @@ def test_a_drive_goes_in_and_out(files: Any, tmp_path: Path) -> None:
     assert re.fullmatch(r"[a-z0-9-]+\.toml", name)
     (tmp_path / name).write_bytes(content)
     assert Drive.load(tmp_path / name) == own
-    files.get_by_test_id("drive-shipped").click()
+    files.get_by_test_id("drive-choice").click()
     files.get_by_role("option", name=Drive.load("servo-axis-small").name).click()
     k_dyn(files, f"{simulate('servo-axis-small', 'direct').k_dyn:.3f}")
 

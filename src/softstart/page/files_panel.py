@@ -36,7 +36,7 @@ from softstart.page.panel_parts import (
     text_field,
     upload,
 )
-from softstart.page.project import project_of, take_file, take_text
+from softstart.page.project import other_machines, project_of, take_file, take_text, turn_to
 from softstart.page.sentences import in_words
 from softstart.page.session import Session
 from softstart.project import Project
@@ -44,6 +44,7 @@ from softstart.project.parts import kind_of, profile_of
 from softstart.views.numbers import cut
 
 LARGEST = 512 * 1024  # bytes of a file
+OF_PROJECT = "project: "  # before the names of its machines
 AS_LOADED, NO_OTHER = "this machine as loaded", "no other machine"
 
 
@@ -52,7 +53,7 @@ class FilesPanel:
 
     def __init__(self, session: Session, user: Hashable) -> None:
         parts = {
-            "Project and drive": (DriveFiles, ProjectNames, BesidePanel),
+            "Project and drive": (DriveFiles, DriveChoice, ProjectNames, BesidePanel),
             "Strategies": (StrategyText,),
             "Export": (Exports, ParameterSheetPanel, ProgramPanel, ReportPanel),
             "Command line": (command_line,),
@@ -64,18 +65,15 @@ class FilesPanel:
 
 
 class DriveFiles:
-    """Load a drive or chain from a file or from the shipped ones; save the present one."""
+    """Load a drive or chain from a file; save the present one, or the project."""
 
     def __init__(self, session: Session, user: Hashable) -> None:
         self._session = session
-        shipped = {"": "choose one", **{name: drive.name for name, drive in shipped_drives().items()}}
         with box("panel-form"):
             remedy = "a drive file has one or two, a project some more"
             upload("Load a file ...", "drive", ".toml,.csv", LARGEST, remedy, self._uploaded, self._refuse)
             action("Save project", self._save_project, "project-save")
             action("Save as TOML", self._save, "drive-save")
-            self._shipped = choice("Shipped drives", shipped, "", "drive-shipped")
-            self._shipped.on_value_change(lambda event: self._take(str(event.value or "")))
         hint(
             "Whatever is saved here: projects, drives, tuned gains, torque profiles (CSV, TOML), duties. A "
             "mistake in a file changes nothing here."
@@ -85,16 +83,6 @@ class DriveFiles:
     def _uploaded(self, content: bytes, name: str) -> None:
         self._troubles.say(())
         notify(take_file(self._session, content, name))
-
-    def _take(self, name: str) -> None:
-        if name:
-            self._shipped.set_value("")
-            self._take_over(shipped_drives()[name])
-
-    def _take_over(self, machine: Machine) -> None:
-        self._troubles.say(())
-        self._session.load(machine)
-        notify(f"{cut(self._session.inputs.machine.name)} is loaded.")
 
     def _refuse(self, name: str, error: InputError) -> None:
         self._troubles.say(error.sentences, f"{cut(name)} was not loaded; nothing is changed.")
@@ -108,6 +96,33 @@ class DriveFiles:
         inputs = self._session.inputs
         machine = inputs.machine if inputs.duty is None else inputs.machine_with_duty
         save(machine.to_toml(), drive_file(machine))
+
+
+class DriveChoice:
+    """Another drive or chain: of the project, or a shipped one."""
+
+    def __init__(self, session: Session, user: Hashable) -> None:
+        self._session = session
+        with box("panel-form"):
+            self.choice = choice("Drives of the project, and shipped", {"": ""}, "", "drive-choice")
+        self.choice.on_value_change(lambda event: self._take(str(event.value or "")))
+        follow(session, self._offer)
+
+    def _offer(self) -> None:
+        own = {OF_PROJECT + name: f"{name} (project)" for name in other_machines(self._session)}
+        options = {"": "choose one", **own, **{name: one.name for name, one in shipped_drives().items()}}
+        if options != self.choice.options:
+            self.choice.set_options(options, value="")
+
+    def _take(self, name: str) -> None:
+        if not name:
+            return
+        self.choice.set_value("")
+        if name.startswith(OF_PROJECT):
+            turn_to(self._session, name.removeprefix(OF_PROJECT))
+        else:
+            self._session.load(shipped_drives()[name])
+        notify(f"{cut(self._session.inputs.machine.name)} is loaded.")
 
 
 class ProjectNames:
@@ -191,7 +206,7 @@ class OtherMachine:
 
     def _offer(self) -> None:
         inputs = self._session.inputs
-        own = [one.name for one in inputs.project.machines if one.name != inputs.project.machine]
+        own = other_machines(self._session)
         names = [name for name, one in shipped_drives().items() if type(one) is type(inputs.machine)]
         if (options := [*dict.fromkeys([self._first, AS_LOADED]), *own, *names]) != self.choice.options:
             self.choice.set_options(options, value=inputs.project.beside or self._first)

@@ -80,6 +80,18 @@ def project_of(session: Session) -> Project:
     )  # fmt: skip
 
 
+def other_machines(session: Session) -> list[str]:
+    """The names of the machines of the project besides the present one."""
+    project = session.inputs.project
+    now = project.machine or session.inputs.machine.name
+    return [one.name for one in project.machines if one.name != now]
+
+
+def turn_to(session: Session, name: str) -> None:
+    """Show another machine of the project; the present one stays in the project as it is now."""
+    session.open(project_of(session).replace(machine=name))
+
+
 def starts_alike(machine: Machine, other: Machine) -> bool:
     """Whether an optimum of one is an optimum of the other: names, units and limits change no start.
 

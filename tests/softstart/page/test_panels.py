@@ -297,3 +297,19 @@ def test_a_machine_beside_this_one_is_that_as_loaded_of_the_project_or_shipped(c
             assert (first.gap, second) == (1.0, other)
     result = function(first, second, controllers, progress=lambda share, what: None)
     assert "K_dyn" in result.html.replace("<sub>dyn</sub>", "_dyn")
+
+
+def test_a_drive_of_the_project_or_a_shipped_one_is_chosen(client: Any) -> None:
+    from softstart.page.files_panel import DriveChoice
+    from softstart.project import Project
+
+    worn = Drive.load("crane-4amtkf").replace(gap=2.0)
+    session = Session(Project.new("crane-4amtkf").added("worn", worn).replace(customer="Harbour"), ["direct"])
+    with client:
+        files = DriveChoice(session, "A")
+        for name, drive in (("project: worn", worn), ("hoist-15kw", Drive.load("hoist-15kw"))):
+            files.choice.set_value(name)
+            assert session.inputs.machine == drive
+            assert (files.choice.value, session.inputs.project.customer) == ("", "Harbour")
+            files._offer()
+    assert list(files.choice.options)[:3] == ["", "project: worn", "project: crane-4amtkf"]

@@ -11,7 +11,7 @@ from softstart import Drive, Duty, InputError, TorqueProfile, optimize, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.page.downloads import profile_file
-from softstart.page.project import project_of, take_file, take_text
+from softstart.page.project import other_machines, project_of, take_file, take_text, turn_to
 from softstart.page.session import ClaimedOptimum, Session
 from softstart.project import Project, StoredOptimum
 from softstart.project.parts import file_of, player_of
@@ -183,3 +183,23 @@ def test_names_and_notes_are_edited_and_undone() -> None:
     assert project_of(session).customer == ""
     session.undo()
     assert project_of(session).customer == "Harbour & Co"
+
+
+def test_the_page_turns_to_another_machine_of_the_project_and_back() -> None:
+    session = worked_on()
+    session.open(project_of(session).added("worn", CRANE.replace(gap=2.0, name="the worn one")))
+    session.set("shaft.gap", "0.9 rad")
+    now, before = session.inputs.project.machine, figures(session)
+    assert other_machines(session) == ["worn"]
+    turn_to(session, "worn")
+    assert session.inputs.machine.gap == 2.0
+    assert (session.inputs.selected, session.inputs.controllers["ramp"].time) == ("ramp", 0.2)
+    assert other_machines(session) == [now]
+    turn_to(session, now)
+    assert session.inputs.machine.gap == 0.9
+    assert figures(session) == before
+    session.undo()
+    session.undo()
+    assert figures(session) == before
+    session.load(Drive.load("conveyor-11kw"))
+    assert other_machines(session) == [now, "worn"]
