@@ -141,7 +141,7 @@ def set_to_text(controller: object, setting: Mapping[str, float], units: Units) 
     si = {name: one.unit for name, one in declared_parameters(controller).items()}
     seen = {name: units.of_setting(name, si[name]) for name in setting}
     return ", ".join(
-        f"{name} {seen[name].shown(value, si[name]):g} {seen[name].label(si[name])}".rstrip()
+        f"{name} {seen[name].shown(value, si[name]):.4g} {seen[name].label(si[name])}".rstrip()
         for name, value in setting.items()
     )
 

@@ -32,11 +32,12 @@ def beside_table(both: SideBySide, title: str = "") -> TextTable:
     alike = bool(first.gear) == bool(second.gear)
     for figure in FIGURES:
         for k, column in enumerate(map(figure.seen, seen)):
-            heading = f"{column.heading}\n{LETTERS[k]}{'' if alike or not figure.si else seen[k].at}"
+            name, line, unit = column.heading.partition("\n")
+            heading = f"{name} {LETTERS[k]}{line}{unit}{'' if alike or not figure.si else seen[k].at}"
             columns.append(column._replace(heading=heading, of=_of(column, k), si=""))
     if any(row.against_limits for pair in both.pairs for row in pair):
         limits = DataColumn("limits", lambda row: row.against_limits)
-        columns += [limits._replace(heading=f"limits\n{LETTERS[k]}", of=_of(limits, k)) for k in (0, 1)]
+        columns += [limits._replace(heading=f"limits {LETTERS[k]}", of=_of(limits, k)) for k in (0, 1)]
     return TextTable.of_data(titled(title, first) if alike else title, columns, rows)
 
 
