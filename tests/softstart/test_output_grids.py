@@ -96,9 +96,14 @@ def loop() -> Any:
     return linear_view(CRANE.replace(damping=0.3), "state-feedback")
 
 
-@pytest.mark.parametrize(("gear", "units"), gears()[:12])
-def test_limit_cycles_are_seen_through_the_gear(gear: Gear, units: str) -> None:
+@pytest.mark.slow
+def test_limit_cycles_are_seen_through_the_gear() -> None:
     """Twists and torques are; frequencies and margins are the same at both shafts."""
+    for gear, units in gears()[:12]:
+        cycle_through(gear, units)
+
+
+def cycle_through(gear: Gear, units: str) -> None:
     cycle = SimpleNamespace(
         frequency=60.0, amplitude=0.3, bias=0.1, demand_amplitude=12.0, stable=True, beyond_limits=False,
         mean_torque=7.16, share=0.4,
@@ -147,6 +152,7 @@ def test_wear_is_seen_through_the_gear(gear: Gear, units: str) -> None:
     assert float(now) == pytest.approx(there(gear, unit, 0.275), rel=5.1e-4)
 
 
+@pytest.mark.slow
 def test_a_plan_and_a_sheet_are_seen_at_either_shaft(capsys: pytest.CaptureFixture[str]) -> None:
     """From the command line: the same widths; peak times i eta, travel over i."""
     gear = Gear(38.1, 0.95)

@@ -218,6 +218,7 @@ def test_a_sheet_sets_the_motor_and_says_what_that_is_at_the_output(gear: Gear, 
         through(found, one, gear, "")
 
 
+@pytest.mark.slow
 def test_the_report_says_the_shaft_once_in_each_part() -> None:
     """The whole page at the output: numbers of the first page, captions, and the sheet in its own units."""
     drive = results().drive.replace(
@@ -294,6 +295,7 @@ def test_scenarios_of_an_optimum_are_at_the_output_too() -> None:
     check(table, "Mc", gear, [drive.Mc] * 2)
 
 
+@pytest.mark.slow
 def test_csv_files_and_saved_results_know_no_shaft(tmp_path: Path) -> None:
     """A plan and a saved curve are the same at either shaft."""
     drive = Drive.load("crane-4amtkf").replace(gear_ratio=38.1, start_position="mid-gap")

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from softstart import Chain, DataSheet, Drive, InputError, compare, machine_table, optimize, simulate, tune
@@ -71,6 +71,7 @@ def test_a_value_at_the_output_is_that_at_the_motor_by_hand_and_comes_back(i, et
     assert moved.replace(**{p.name: value}) == moved
 
 
+@settings(max_examples=50)
 @given(ratios, efficiencies, st.floats(0.2, 5.0), st.floats(0.1, 2.0), st.sampled_from([1.0, -1.0]))
 def test_a_limit_at_the_output_is_judged_as_the_same_at_the_motor(i, eta, most, share, sense) -> None:
     """M at the output permits M/(i eta) at the motor, M eta/i where the load drives; the stricter counts.
@@ -232,6 +233,23 @@ def test_a_drive_with_its_gear_is_the_chain_that_has_the_gear_in_its_shaft(eta: 
         assert one.start_time == pytest.approx(other.start_time, rel=1e-10)
     assert one.used_torque == pytest.approx(100.0 * one.peak_torque_at_output / 1600.0, rel=1e-12)
     assert one.used_torque == pytest.approx(other.used_torque, rel=1e-10)
+
+
+@given(st.floats(0.5, 0.98), st.floats(0.01, 0.3), st.sampled_from(["direct", "ramp", "s-curve"]))
+def test_a_better_gear_loads_the_output_more_and_starts_sooner(eta, better, controller) -> None:
+    """What limits and start times are checked with where the efficiency is uncertain."""
+    starts = [
+        simulate(
+            geared(38.1, one).replace(
+                load_inertia="290 kg*m^2 at output", stiffness="500 kN*m/rad at output",
+                load_torque="200 N*m at output", gap="30 arcmin at output", start_position="mid-gap",
+            ),
+            controller,
+        )
+        for one in (eta, min(eta + better, 1.0))
+    ]  # fmt: skip
+    assert starts[0].peak_torque_at_output < starts[1].peak_torque_at_output
+    assert starts[0].start_time > starts[1].start_time
 
 
 def test_everything_that_takes_a_gap_takes_it_at_the_output() -> None:
