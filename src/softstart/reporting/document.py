@@ -80,7 +80,7 @@ _BEFORE_UNIT = re.compile(
     r"(?<=[\d,]) (?=(?:k?N\xa0m|kg\xa0m|lbf|ms|s|rad|deg|arcmin|rpm|mm|Hz|kW|W|%)(?!\w))"
 )
 _KEY = re.compile(r"\b[a-z]+(?:_[a-z]+)+(?= \d| settles)")  # of a parameter, before its value
-_DECIMAL = re.compile(r"(?<![\w.])(\d+)\.(\d+)(?![\w]|\.\d)")
+_DECIMAL = re.compile(r"(?<![\w.])(x?\d+)\.(\d+)(?![\w]|\.\d)")
 
 
 def typeset(text: object, comma: bool = False) -> Markup:
@@ -98,7 +98,11 @@ def typeset(text: object, comma: bool = False) -> Markup:
 
 
 def with_comma(text: str, comma: bool) -> str:
-    """A text with decimal commas if asked; version numbers stay as they are."""
+    """A text with decimal commas if asked; version numbers stay as they are.
+
+    >>> with_comma("exceeded x2.17, J2 x0.4, softstart 0.1.0", True)
+    'exceeded x2,17, J2 x0,4, softstart 0.1.0'
+    """
     return _DECIMAL.sub(r"\1,\2", text) if comma else text
 
 
