@@ -118,3 +118,6 @@ def test_a_table_that_is_too_wide_goes_on_below_its_keys():
     assert all(row[:2] == ["gap", "J2"] for row in headings)
     assert [one for row in headings for one in row[2:]] == list("abcdefgh")
     assert as_html(sheet).count("<table>") == 1
+    untitled = as_html(Sheet("title", tables=[TextTable.of("", cells, keys=2)]), width=200.0)
+    assert set(re.findall(r"<caption>(.*?)</caption>", untitled)) <= {"", "continued"}
+    assert "continued" in untitled

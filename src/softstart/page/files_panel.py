@@ -292,7 +292,7 @@ class ParameterSheetPanel(JobPanel):
     about = (
         "What to set on the inverter for the selected strategy, tuned gains too: rounded values in its "
         "units, with the K_dyn of exactly these. Where the strategy does not keep the limits as it is, it is "
-        "set for them."
+        "set for them. Add takes the values of the sheet into the table."
     )
     verb = "Parameter sheet"
 

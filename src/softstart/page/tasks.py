@@ -302,12 +302,14 @@ def checked(possible: Machine, controllers: Mapping[str, Controller], *, progres
 
 
 def sheet_task(drive: Machine, controller: Controller, file: str, *, progress: Progress) -> TaskResult:
-    """The parameter sheet of a strategy: rounded values, and the start with exactly these."""
+    """The parameter sheet of a strategy: rounded values, and the start with exactly these, to be added."""
     from softstart.reporting.sheet import parameter_sheet
 
     progress(None, "rounding, and starting the drive half a step off")
     found = parameter_sheet(drive, controller)
-    return TaskResult(shown(found.sheet), {file: str(found)}, copy=str(found))
+    as_printed = None if found.failure or found.cells or not found.settings else found.rounded.controller
+    added = {} if as_printed is None else {f"{found.name.removesuffix(', sheet')}, sheet": as_printed}
+    return TaskResult(shown(found.sheet), {file: str(found)}, added, copy=str(found))
 
 
 def report_task(

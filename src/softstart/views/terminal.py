@@ -70,7 +70,7 @@ def blocks_of(table: TextTable, needed: Sequence[float], width: float) -> list[T
         used += needed[i]
     return [
         table._replace(
-            title=f"{table.title}, continued" if number else table.title,
+            title=f"{table.title}, continued".removeprefix(", ") if number else table.title,
             columns=[columns[i] for i in block],
             rows=[[row[i] for i in block] for row in rows],
         )

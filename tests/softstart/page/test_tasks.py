@@ -30,6 +30,7 @@ from softstart import (
     tune,
 )  # fmt: skip
 from softstart.controller import make_controller
+from softstart.controller.finding import named
 from softstart.identification.planning import simulated_log
 from softstart.page import tasks
 from softstart.page.downloads import command_text, file_name
@@ -38,6 +39,23 @@ from softstart.page.sentences import changed_since, page_sentence
 from softstart.project import Project
 
 CRANE = Drive.load("crane-4amtkf")
+
+
+def test_the_values_of_a_parameter_sheet_can_be_added() -> None:
+    """Set for the limits and rounded: started again they have the K_dyn of the sheet, and keep the limit."""
+    drive = CRANE.replace(permissible_torque=75.0)
+    ramp = make_controller("speed-ramp")
+    made = tasks.sheet_task(drive, ramp, "ramp.txt", progress=lambda *_: None)
+    ((label, added),) = made.controllers.items()
+    run = simulate(drive, added)
+    assert label == "speed-ramp, sheet"
+    worn = drive.scaled(gaps=4.0)
+    as_it_is, as_added = (simulate(worn, one, fitted_to=drive).peak_torque for one in (ramp, added))
+    assert as_added < 75.0 < as_it_is
+    assert f"values of the sheet {run.k_dyn:.4f}" in " ".join(made.copy.split())
+    again = tasks.sheet_task(drive, named(added, label), "ramp.txt", progress=lambda *_: None)
+    assert list(again.controllers) == [label]
+    assert tasks.sheet_task(drive, make_controller("direct"), "d.txt", progress=lambda *_: None).controllers
 
 
 class Heard:
