@@ -13,7 +13,7 @@ from softstart.errors import InputError, Mistakes
 from softstart.optimal.problem import StartTime
 from softstart.page import tasks
 from softstart.page.job_panel import JobPanel, Task, starts_seconds
-from softstart.page.panel_parts import TERMINALS, choice, text_field, upload
+from softstart.page.panel_parts import TERMINALS, choice, follow, text_field, upload
 from softstart.plugins import controller_names
 from softstart.quantities import values_in
 from softstart.tuning.problem import gaps_of, inertias_of
@@ -111,9 +111,9 @@ class TuningPanel(JobPanel):
 
     def form(self) -> None:
         """The controller, the grid, and how long to search."""
-        names = tunable_controllers()
-        first = "shaped" if "shaped" in names else names[0]
-        self.controller = choice("Strategy", names, first, "tuning-controller")
+        names, self._offered = tunable_controllers(), ""
+        self.controller = choice("Strategy", names, names[0], "tuning-controller")
+        follow(self.session, self._offer)
         example = "0.5 (in the page's unit), 30 deg, or 2x the drive's"
         self.gaps = text_field("Gaps", "0.5x, 1x, 2x, 4x", "tuning-gaps", example)
         example = "0.1 (kg m2), 2x of the drive's own, or 5J1 of the motor's"
@@ -121,6 +121,13 @@ class TuningPanel(JobPanel):
         self.searches = choice("Search", SEARCHES, "3", "tuning-searches")
         self.certified = ui.checkbox("optimum of each cell", value=False).classes("panel-check")
         self.certified.props('dense data-testid="tuning-certified"')
+
+    def _offer(self) -> None:
+        """The selected strategy, until another one is chosen here."""
+        selected = self.session.inputs.selected
+        if selected != self._offered and selected in self.controller.options:
+            self._offered = selected
+            self.controller.set_value(selected)
 
     def task(self) -> Task:
         """The tuning."""

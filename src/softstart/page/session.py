@@ -383,8 +383,8 @@ class Session:
         selected = chosen if chosen in controllers else _first_selected(controllers)
         self._change(
             machine=stiff, origin=stiff, controllers=controllers, selected=selected,
-            visible=frozenset((selected, *own)), duty=duty, project=project,
-            optima={},
+            visible=frozenset((selected, *own)) | (self.inputs.visible & controllers.keys()), duty=duty,
+            project=project, optima={},
         )  # fmt: skip
 
     def describe(self, key: str, text: str) -> None:

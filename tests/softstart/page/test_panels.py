@@ -313,3 +313,23 @@ def test_a_drive_of_the_project_or_a_shipped_one_is_chosen(client: Any) -> None:
             assert (files.choice.value, session.inputs.project.customer) == ("", "Harbour")
             files._offer()
     assert list(files.choice.options)[:3] == ["", "project: worn", "project: crane-4amtkf"]
+
+
+def test_tuning_begins_with_the_selected_strategy(client: Any) -> None:
+    from softstart.page.panels import TuningPanel
+
+    session = Session("crane-4amtkf")
+    session.select("ramp")
+    with client:
+        panel = TuningPanel(session, "A", Queue())
+        assert panel.controller.value == "ramp"
+        panel.controller.set_value("shaped")
+        session.set("gap", 1.0)
+        panel._offer()
+        assert panel.controller.value == "shaped"  # chosen here
+        session.select("s-curve")
+        panel._offer()
+        assert panel.controller.value == "s-curve"
+        session.select("direct")  # has nothing to tune
+        panel._offer()
+        assert panel.controller.value == "s-curve"
