@@ -61,4 +61,4 @@ def test_a_report_has_the_sheet_with_settled_times():
     assert "speed-ramp at inverters" in text
     assert "Kp in per cent of torque per per cent of speed" in text
     assert "settled time, s" in text
-    assert "speed-ramp (for an inverter with closed-loop speed control)" in text
+    assert "speed-ramp (an inverter with closed-loop speed control)" in text
