@@ -195,8 +195,12 @@ def written(value: float, si: str, units: Units) -> str:
     ('4 deg', '0.333333')
     >>> written(0.06981317007977318, "rad", Units("deg")), written(0.07, "rad", Units("deg"))
     ('4', '4.0107')
+    >>> written(2980671.4, "N*m/rad", Units()), written(2.5e-7, "N*m/rad", Units())
+    ('2980670', '2.5e-07')
     """
     if units.of(si) != si or units.gear:
-        return f"{units.shown(value, si):.6g}"
-    text = shortest(value, si)
-    return text if " " in text else f"{value:.6g}"
+        value = units.shown(value, si)
+    elif " " in (text := shortest(value, si)):
+        return text
+    text = f"{value:.6g}"
+    return f"{float(text):.0f}" if 1e6 <= abs(value) < 1e9 else text  # a field has no room for an exponent
