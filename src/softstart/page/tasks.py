@@ -307,7 +307,8 @@ def sheet_task(drive: Machine, controller: Controller, file: str, *, progress: P
 
     progress(None, "rounding, and starting the drive half a step off")
     found = parameter_sheet(drive, controller)
-    as_printed = None if found.failure or found.cells or not found.settings else found.rounded.controller
+    printed = found.rounded if found.settings and not found.cells else None
+    as_printed = None if printed is None else printed.controller
     added = {} if as_printed is None else {f"{found.name.removesuffix(', sheet')}, sheet": as_printed}
     return TaskResult(shown(found.sheet), {file: str(found)}, added, copy=str(found))
 
