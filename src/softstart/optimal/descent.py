@@ -26,7 +26,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from softstart.arrays import Matrix, Vector
+from softstart.arrays import Indices, Matrix, Vector
 from softstart.optimal.demand import Demand
 from softstart.optimal.model import LET_THROUGH, Model
 from softstart.optimal.search import MOST_KNOTS, PENALTY, Found, Search
@@ -44,6 +44,7 @@ JUMP, HALVED = 0.04, 32  # bend of the torque, in highest torques, beside which 
 FEW, ROUGH = 4, 1e-4  # times that large demands are refined, and how exactly
 STALLED = 3e-4  # of the merit: a gain on a finer grid after which a descent goes on
 INSIDE = 0.02  # of an interval, that a new step keeps from its ends
+BOUND = 1e-6  # share of the rate of a torque, by which it lies below its limit and counts as there
 SWITCH, LEVEL = 0.25, 0.02  # change of the torque, in highest torques, that becomes a step between two levels
 
 
@@ -200,12 +201,30 @@ class Descent(Search):
             moves = 0.1 * self.period * (self.objective == "start_time")
             longer = float(np.clip(self.latest - found.end, 0.0, moves))
             low, high = np.append(low.clip(max=0.0), -moves), np.append(high.clip(min=0.0), longer)
-            room = least_change(np.column_stack([rows, rates]), missing, low, high)
+            block = np.append(self._blocks(demand), demand.size)
+            first = np.flatnonzero(np.diff(block, prepend=-1))
+            together = np.add.reduceat(np.column_stack([rows, rates]), first, axis=1)
+            low, high = np.maximum.reduceat(low, first), np.minimum.reduceat(high, first)
+            room = np.repeat(
+                least_change(together, missing, low, high), np.diff(np.append(first, block.size))
+            )
             again = self.play(self.allowed(demand.changed(room[:-1])), found.end + float(room[-1]))
             if again is None:
                 return None
             found = again
         return found
+
+    def _blocks(self, demand: Demand) -> Indices:
+        """By unknown, the first of those that move together: knots between which the rate is at its limit.
+
+        One of them alone would be brought back by `allowed`.
+        """
+        block = np.arange(demand.size)
+        if math.isfinite(self.rate):
+            bound = np.abs(np.diff(demand.torque)) >= (1.0 - BOUND) * self.rate * np.diff(demand.time)
+            block[1:][bound] = 0
+            block = np.maximum.accumulate(block)
+        return block
 
 
 def least_change(rows: Matrix, wanted: Vector, low: Vector, high: Vector) -> Vector:

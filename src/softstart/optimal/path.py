@@ -13,9 +13,10 @@ limits of the torque at random instants, by their exact starts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ LONG = 1.0, 1.4, 2.0, 3.0  # times a usual start: where an easy one is looked fo
 WIDE, NARROW, RISE = 0.1, 2e-3, 0.08  # of the start time: steps down; the rise of K_dyn that is aimed at
 MOST_RISE, LEAST = 0.2, 4e-3  # of K_dyn, above which a step is taken again shorter; the shortest that is
 LEFT = 3  # nodes at which the way down is better in succession: then the way up is left
+NEIGHBOURS = 2  # nodes on each side of a start time, that are followed to it
 BEST, ALIKE = 3, 1.01  # starts that are refined, if they are so near to the best one
 MILD = 1.15  # K_dyn up to which the way down is enough
 FOLLOWS, DEAR = 30, 2e3  # steps from a neighbour, and the penalty up to which they are tried again
@@ -180,20 +182,18 @@ class Path:
 
     def followed(self, search: Descent, *neighbours: Found | None) -> Found | None:
         """The best of one descent from the demand of each neighbour, as it is or scaled in time."""
-        ended = []
-        for one in neighbours:
-            if one is None:
-                continue
-            known = one.profile.simplified(BEND)
-            scaled = TorqueProfile(known.time * (search.latest / one.end), known.torque)
-            played = [start for each in (known, scaled) if (start := search.play(search.onto(each)))]
-            played.sort(key=Found.merit)
-            for start in played:
-                down = self._ended(search.down(start, FOLLOWS, ROUGH, DEAR), search)
-                if down is not None:
-                    ended.append(down)
-                    break
-        return min(ended, key=Found.merit, default=None)
+        ended = [next(self._ways(search, one), None) for one in neighbours if one is not None]
+        return min((one for one in ended if one), key=Found.merit, default=None)
+
+    def _ways(self, search: Descent, neighbour: Found) -> Iterator[Found]:
+        """Starts by descents from its demand as it is and scaled in time, the one that seems nearer first."""
+        known = neighbour.profile.simplified(BEND)
+        scaled = TorqueProfile(known.time * (search.latest / neighbour.end), known.torque)
+        played = [start for each in (known, scaled) if (start := search.play(search.onto(each)))]
+        for start in sorted(played, key=Found.merit):
+            down = self._ended(search.down(start, FOLLOWS, ROUGH, DEAR), search)
+            if down is not None:
+                yield down
 
     def easy(self, found: Found | None) -> bool:
         """Whether a start is one whose optimum a single search has."""
@@ -220,9 +220,12 @@ class Path:
                 beyond = self.descent(farther)
                 found = self.followed(beyond, known)
                 nodes.insert(0, Node(farther, min((one for one in (found, known) if one), key=self._figure)))
-            below = next((one.found for one in nodes if one.latest <= latest), None)
-            above = next((one.found for one in reversed(nodes) if one.latest > latest), None)
-            found = self._polished(search, [*ended, self.followed(search, below, above), below])
+            below = [one.found for one in nodes if one.latest <= latest][:NEIGHBOURS]
+            above = [one.found for one in nodes if one.latest > latest][-NEIGHBOURS:]
+            led_to = chain.from_iterable(self._ways(search, one) for one in (*below, *above))
+            in_time = [one.found for one in nodes if one.found.end <= latest]
+            best = min(in_time, key=self._figure, default=None)
+            found = self._polished(search, [*ended, *led_to, best])
         return None if found is None else self.first(search, found)
 
     def _polished(self, search: Descent, ended: Sequence[Found | None]) -> Found | None:

@@ -55,8 +55,9 @@ class Found:
 
     @property
     def ends(self) -> bool:
-        """Whether it is a start that keeps all conditions."""
-        return self.missed <= MET and float(self.lacking.max()) <= self.met
+        """Whether it is one that keeps all conditions; of the distance to a curve a little may be used."""
+        kept = self.beyond <= 0.1 * BETWEEN and 0.02 * self.over <= MET
+        return kept and float(self.lacking.max()) <= self.met
 
     @property
     def near(self) -> bool:

@@ -67,6 +67,22 @@ def test_what_a_small_step_promises_comes_true(name: str, objective: Any) -> Non
     assert abs(shares[-1]) < 0.05 * promised + 5e-6 * found.merit(penalty), (shares, promised)
 
 
+@pytest.mark.parametrize("rate", [700.0, 1500.0])
+def test_the_end_is_met_where_the_rate_of_the_torque_is_at_its_limit(rate: float) -> None:
+    """A knot that moves alone is brought back: knots at the limit move together."""
+    search = of(Problem(CRANE.replace(torque_rate=rate, torque_lag=0.002), 0.33, "synchronous"))
+    found = search.down(seeds.pulse_coast_level(search)[0])
+    assert found is not None
+    steep = rate * np.diff(found.demand.time) * (1.0 - 1e-9)
+    assert (np.abs(np.diff(found.demand.torque)) >= steep).sum() > 3
+    wide = search.play(search.allowed(found.demand.changed(np.full(found.demand.size, 1e-4))), found.end)
+    assert wide is not None
+    assert wide.lacking.max() > 1e-5
+    done = search.finished(wide)
+    assert done is not None
+    assert done.ends
+
+
 @pytest.mark.parametrize("terminal", ["reached", "synchronous", "steady"])
 def test_finished_meets_the_end_by_the_smallest_changes(terminal: Any) -> None:
     problem = Problem(CRANE.replace(damping=0.3), 0.3, terminal)
