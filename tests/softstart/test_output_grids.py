@@ -174,4 +174,5 @@ def test_a_plan_and_a_sheet_are_seen_at_either_shaft(capsys: pytest.CaptureFixtu
         assert main([command[0], "crane-4amtkf", *command[1:], *at]) == 0
         assert "all values are at the output of the gear" in capsys.readouterr().out
         assert main([command[0], "crane-4amtkf", *command[1:], *at[6:]]) == 2
-        assert "--at output: without gear.ratio" in capsys.readouterr().err
+        said = capsys.readouterr().err
+        assert '--at output: without gear.ratio nothing is "at output"; give it, or leave --at out.' in said

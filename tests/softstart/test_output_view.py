@@ -273,7 +273,8 @@ def test_without_an_output_it_is_refused_in_one_sentence(
 ) -> None:
     controller = ["--controller", "ramp"] if command in ("simulate", "tune") else []
     assert main([command, machine, *controller, "--at", "output"]) == 2
-    assert capsys.readouterr().err == f"softstart: --at output: {reason}.\n"
+    said = reason.replace("or write the value at the motor shaft", "or leave --at out")
+    assert capsys.readouterr().err == f"softstart: --at output: {said}.\n"
     kind = Chain if machine == "crane-4-mass" else Drive
     with pytest.raises(InputError, match=re.escape(reason)):
         kind.load(machine).replace(units="at output")

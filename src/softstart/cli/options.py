@@ -481,7 +481,9 @@ def seen(found: Any) -> Any:
     try:
         return seen_at(found, shaft)
     except RefusedError as refusal:
-        raise InputError(f"--at {shaft}: {refusal.reason}.") from None
+        # where no value was written "at output", none can be written at the motor
+        reason = refusal.reason.replace("or write the value at the motor shaft", "or leave --at out")
+        raise InputError(f"--at {shaft}: {reason}.") from None
 
 
 def typed_duty(given: Machine | Identification) -> Duty | bool | None:
