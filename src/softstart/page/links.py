@@ -18,11 +18,13 @@ from typing import Any
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import make_controller
+from softstart.drive.machine import Machine
 from softstart.errors import InputError, Mistakes
 from softstart.page.duty import packed_plan, plan_of, unpacked_plan
 from softstart.page.machines import machine_from, startable
-from softstart.page.session import LONGEST_TIME, Inputs, Reference, Session
+from softstart.page.session import LONGEST_TIME, NO_PROJECT, Inputs, Reference, Session
 from softstart.plugins import controller_names
+from softstart.project import Project
 
 MAX_STORED = 64  # inputs of tabs that may be reloaded
 LONGEST = 16_384  # characters of a link
@@ -96,7 +98,8 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
         machine, _ = plan_of(machine_from(content["drive"]))
         origin = plan_of(machine_from(content["origin"]))[0] if content["origin"] else machine
         duty = unpacked_plan(content.get("duty"))
-        same = origin == now.origin
+        project = _project_of(origin, now)
+        same = project is not None
         controllers = {
             name: controller
             for name, controller in now.controllers.items()
@@ -126,7 +129,19 @@ def inputs_of(link: str, now: Inputs) -> Inputs:
         reference,
         str(content.get("at_time", ""))[:LONGEST_TIME],
         duty,
+        project or NO_PROJECT,
+        now.optima if origin == now.origin else {},
     )
+
+
+def _project_of(origin: Machine, now: Inputs) -> Project | None:
+    """The present project if it has this machine, which is then the one chosen; None if it has not."""
+    if origin == now.origin:
+        return now.project
+    for one in now.project.machines:
+        if plan_of(now.project.single(one.name))[0] == origin:
+            return now.project.replace(machine=one.name)
+    return None
 
 
 def _reference(content: Any, now: Inputs) -> Reference | None:

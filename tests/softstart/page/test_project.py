@@ -11,6 +11,7 @@ from softstart import Drive, Duty, InputError, TorqueProfile, optimize, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
 from softstart.page.downloads import profile_file
+from softstart.page.links import inputs_of, link_of
 from softstart.page.project import other_machines, project_of, take_file, take_text, turn_to
 from softstart.page.session import ClaimedOptimum, Session
 from softstart.project import Project, StoredOptimum
@@ -203,3 +204,25 @@ def test_the_page_turns_to_another_machine_of_the_project_and_back() -> None:
     assert figures(session) == before
     session.load(Drive.load("conveyor-11kw"))
     assert other_machines(session) == [now, "worn"]
+
+
+def test_a_page_that_is_reloaded_by_its_link_keeps_the_project() -> None:
+    """A server that was started again knows the file it was given, and the address of the tab."""
+    session = worked_on()
+    session.describe("customer", "Harbour")
+    session.open(project_of(session).added("worn", CRANE.replace(gap=2.0, name="the worn one")))
+    given = session.inputs.project
+    for name in (given.machine, "worn"):
+        if name != session.inputs.project.machine:
+            turn_to(session, name)
+        session.set("shaft.damping", 0.1)
+        again = Session(given, ["direct", "ramp", "s-curve"])
+        again.restore(inputs_of(link_of(session.inputs), again.inputs))
+        assert figures(again) == figures(session)
+        project = project_of(again)
+        assert (project.customer, project.machine) == ("Harbour", name)
+        assert project.single() == project_of(session).single()
+        assert {one.name for one in project.strategies} >= {"profile 1", "ramp (robust)"}
+    other = Session("hoist-15kw", ["direct"])
+    other.restore(inputs_of(link_of(session.inputs), other.inputs))
+    assert project_of(other).customer == ""
