@@ -15,11 +15,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.softstart.test_output_view import agrees, check, columns, gears, there
 
-from softstart import Drive, linear_view, sweep
+from softstart import Drive, linear_view, simulate, sweep
 from softstart.cli.main import main
 from softstart.identification.result import Estimate
 from softstart.identification.wear import Line
 from softstart.input.gear import Gear
+from softstart.start.recommendation import margins_of
 from softstart.sweeping.summary import summarise
 from softstart.views.identification import wear_conclusion, wear_notes, wear_table
 from softstart.views.linear import linear_notes, tables
@@ -88,6 +89,18 @@ def test_where_some_loads_drive_everything_is_at_the_motor_shaft() -> None:
         columns(sheet.tables[-1])["peak torque"][1], results["peak_torque"].values, strict=True
     ):
         assert agrees(cell, value)
+
+
+def test_in_a_grid_each_load_is_judged_by_its_own_way_through_the_gear() -> None:
+    """Margins of a limit at the output, one load driven and one that drives, are those of single starts."""
+    drive = behind(Gear(40.0, 0.8), "rad").replace(permissible_output_torque=5000.0)
+    loads = [-2.0, 4.0]
+    results = sweep(drive, "direct", {"load_torque": loads}, figures=["peak_torque", "margin"], workers=1)
+    for load, factor, margin in zip(loads, (50.0, 32.0), results["margin"].values, strict=True):
+        run = simulate(drive.replace(load_torque=load), "direct")
+        (one,) = margins_of(run)
+        assert one.share == pytest.approx(margin, rel=1e-9)
+        assert one.value == pytest.approx(factor * run.peak_torque, rel=1e-12)
 
 
 @cache
