@@ -157,6 +157,15 @@ def test_limits_that_nothing_keeps():
     assert found.recommendation.shown == ()
 
 
+def test_a_limit_that_decides_nothing_is_doubted_where_it_decides():
+    """The permissible torque of the output taken for that of the motor shaft: every start keeps it."""
+    crane = Drive.load("crane-4amtkf")
+    for torque, doubted in ((9.9, False), (10.1, True)):
+        table = compare(crane.replace(permissible_torque=torque * crane.starting_torque), ["direct"])
+        assert table.recommendation.recommended.name == "direct"
+        assert ("check it before you rely on this" in table.recommendation.text) == doubted
+
+
 def test_the_life_is_a_limit_like_the_others():
     """Hours of operation times starts per hour, over the starts to failure, in the worst case."""
     aged = HOIST.replace(

@@ -34,7 +34,7 @@ def plausibility_warnings(machine: Machine) -> list[str]:
     return [
         *_doubts(machine.lever_rule_model),
         *_not_the_rated_torque(machine.motor),
-        *_permits_anything(machine),
+        *permits_anything(machine),
         *_nothing_holds(machine),
     ]  # fmt: skip
 
@@ -153,7 +153,7 @@ def _not_the_rated_torque(motor: Any) -> Iterator[str]:
         )
 
 
-def _permits_anything(machine: Machine) -> Iterator[str]:
+def permits_anything(machine: Machine) -> Iterator[str]:
     """A permissible torque that decides nothing: mostly that of the output of a gear, taken at the motor."""
     if machine.motor is None:
         return

@@ -17,6 +17,7 @@ from typing import Any, Final
 from softstart.controller.base import Controller, Effort, effort_of, label_of
 from softstart.controller.parameters import set_to_text
 from softstart.drive import Limit, Limits, Machine
+from softstart.drive.plausibility import permits_anything
 from softstart.errors import Sentence
 from softstart.quantities import Units
 from softstart.results import OneLine
@@ -345,6 +346,9 @@ class Recommendation(OneLine):
         }
 
 
+LOOSE = "The permissible torque is above 10 times the starting torque: check it before you rely on this."
+
+
 def recommend(drive: Machine, rows: Iterable[Row], tried: Sequence[Row] = ()) -> Recommendation:
     """The recommendation among the strategies started on a drive.
 
@@ -354,7 +358,8 @@ def recommend(drive: Machine, rows: Iterable[Row], tried: Sequence[Row] = ()) ->
     able = [row for row in rows if not row.flags and row.effort is not Effort.SENSOR]
     best = _pareto_set(able)
     if limits:
-        return _with_limits(limits, rows, able, best, unchecked_life(drive), tried)
+        doubt = LOOSE * any(permits_anything(drive))
+        return _with_limits(limits, rows, able, best, f"{doubt} {unchecked_life(drive)}".strip(), tried)
     advice = f"For a recommendation, give {drive.LIMITS_GIVEN}." if best else ""
     fact = f"{_pareto_optimal(best, rows)} {unchecked_life(drive)}".rstrip()
     page = "For a recommendation, enter limits on the left." if best else ""
