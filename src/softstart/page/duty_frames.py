@@ -14,6 +14,7 @@ from softstart.arrays import Matrix, Vector
 from softstart.errors import InputError
 from softstart.page.duty import KINDS
 from softstart.quantities import Units
+from softstart.views.drawing import strategy_colours
 from softstart.views.duties import against_limits, headline, how_of, life_conclusion, life_or_reason
 from softstart.views.numbers import unit
 
@@ -45,6 +46,7 @@ def duty_view(inputs: Inputs, result: DutyResult | None, step: int) -> Frame:
         "waits": result is None,
         "trouble": "" if result is None else result.trouble,
         "strategy": inputs.selected,
+        "colours": strategy_colours(list(inputs.controllers))[inputs.selected],
         "units": {"angle": units.of("rad"), "speed": units.of("rad/s"), "torque": unit(units.of("N*m"))},
         "at": units.at,
         "trace": None,

@@ -10,6 +10,7 @@ import pytest
 import softstart.page
 from softstart import compare
 from softstart.controller.finding import ready_controller_names
+from softstart.page.duty_frames import duty_view
 from softstart.page.frames import FrameBuilder
 from softstart.page.session import Session
 from softstart.views.drawing import STRATEGIES
@@ -94,3 +95,6 @@ def test_a_strategy_has_the_same_colour_wherever_it_is_drawn():
     colours = FrameBuilder(Session()).main_frame()["colours"]
     for name in ("ramp", "direct"):
         assert drawn[name] == colours[name][0]
+    session = Session()
+    session.select("ramp")
+    assert duty_view(session.inputs, None, 0)["colours"] == colours["ramp"]

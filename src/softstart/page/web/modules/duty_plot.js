@@ -164,7 +164,7 @@ export class DutyPlot {
   }
 
   get own() {
-    return this.theme.colours.accent;
+    return this.theme.strategy(this.view.colours);
   }
 
   torques(panel) {
