@@ -73,9 +73,12 @@ def compare_command(
         )
     with working("starting the drive ..."), attributed():
         comparison = softstart.compare(drive, controllers_from_options(controllers, params), **arguments)
+    from softstart.project.parts import refuse_longer
     from softstart.views.starts import comparison_sheet
 
     rows = list(comparison.rows)
+    for row in rows:
+        refuse_longer(row.run, f'strategy "{row.name}"')
     if controllers is None:
         rows.sort(key=lambda row: row.run.k_dyn)
     sheet = comparison_sheet(comparison, rows, details or option_value("out") is not None)
@@ -138,8 +141,12 @@ def simulate_command(
         (strategy,) = controllers_from_options([controller], params, several=False)
         run = softstart.simulate(drive, strategy, until, fitted_to=fitted_to)
         _ = run.settled_time  # it may ask the controller on
+    from softstart.project.parts import refuse_longer
     from softstart.start.recommendation import margins_of
     from softstart.views.starts import run_sheet
+
+    if until is None:
+        refuse_longer(run, f"--controller {controller}")
 
     data = {
         **run.summary(),

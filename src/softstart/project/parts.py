@@ -220,7 +220,7 @@ def profile_of(controller: Controller) -> TorqueProfile | None:
     >>> profile_of(make_controller("direct")) is None
     True
     """
-    profile = getattr(controller, "profile", None)
+    profile = getattr(controller, "played", None)
     return profile if isinstance(profile, TorqueProfile) else None
 
 

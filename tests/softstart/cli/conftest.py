@@ -75,6 +75,7 @@ def place(tmp_path, monkeypatch):
     (tmp_path / "wrong.toml").write_text(
         DRIVE.replace('"62 N*m"', '"62 N"').replace("gap = 0.5", "gap = nan")
     )
+    (tmp_path / "long.csv").write_text("time,torque\n0,40\n30,40\n60,62\n")
     (tmp_path / "folder").mkdir()
     return tmp_path
 

@@ -32,6 +32,8 @@ REFUSED = [
     (START + "ramp --param time=1 --param time=2", "given twice"),
     ("compare --param time=1", "CONTROLLER.key=value"),
     ("compare --controllers direct --param ramp.time=1", "ramp is not compared here"),
+    ("simulate good.toml --controller long.csv", "until 60 s", "correct the unit of its time"),
+    ("compare good.toml --controllers direct,long.csv", 'strategy "long"', "has ended at"),
     # --out
     *((f"{command} --out good.toml", "is a file, not a folder") for command in ("compare", "optimize", GRID)),
     (START + "direct --out ''", "name of the folder is empty"),
