@@ -136,6 +136,7 @@ class PartStore:
         self._parts: dict[str, PartRecord] = {}
         self.damaged: list[str] = []  # parts that were not as they had been written
         self._base: sqlite3.Connection | None = None
+        self._using = threading.Lock()  # SQLite is not closed by a signal's thread while another writes
         self._open, self._stays = ExitStack(), False
 
     def __enter__(self) -> Self:
@@ -152,8 +153,9 @@ class PartStore:
                     file.parent.mkdir(parents=True, exist_ok=True)
                 stack.callback(self._close, made)
                 stack.enter_context(at_stop(lambda: self._close(made)))
-                self._base = sqlite3.connect(file, 0.0, isolation_level=None, check_same_thread=False)
-                self.damaged = self._read(self._base)
+                with self._using:
+                    self._base = sqlite3.connect(file, 0.0, isolation_level=None, check_same_thread=False)
+                    self.damaged = self._read(self._base)
                 if not self.target.inside:  # a folder reports its own files with them
                     self.target.warn_of_damage(self.damaged)
                 self._open = stack.pop_all()
@@ -181,7 +183,9 @@ class PartStore:
         key = json.dumps([record[name] for name in self.keys])
         self._parts[key] = dict(record)
         if self.target is not None:
-            with self.target.errors():
+            with self.target.errors(), self._using:
+                if STOPPING.is_set():  # it may be closed already
+                    raise KeyboardInterrupt
                 self._insert(key, json.dumps(record, allow_nan=False))
 
     def _insert(self, key: str, text: str) -> None:
@@ -221,8 +225,9 @@ class PartStore:
         return [f"part {key}" for key in bad]
 
     def _close(self, made: Sequence[Path]) -> None:
-        if self._base is not None:
-            self._base.close()
+        with self._using:
+            if self._base is not None:
+                self._base.close()
         if made and not self._parts and not self._stays:
             made[0].unlink(missing_ok=True)
             with suppress(OSError):

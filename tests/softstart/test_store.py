@@ -7,6 +7,7 @@ import re
 import sqlite3
 import subprocess
 import sys
+import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
@@ -14,6 +15,7 @@ from contextlib import closing
 import pytest
 
 from softstart.errors import DamagedWarning, InputError
+from softstart.stopping import AT_STOP
 from softstart.store import PartStore, Target, fresh_folder
 
 INPUTS = {"drive": "crane", "seed": 0, "metric": "k_dyn"}
@@ -132,6 +134,7 @@ def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
 HOLDER = """
 import sys
 from pathlib import Path
+from softstart.stopping import AT_STOP
 from softstart.store import PartStore, Target, fresh_folder
 path = Path(sys.argv[1])
 with fresh_folder(path.parent), PartStore(Target("save_to", path, "tuning"), {}, ["cell"]) as kept:
@@ -139,6 +142,33 @@ with fresh_folder(path.parent), PartStore(Target("save_to", path, "tuning"), {},
     print("held", flush=True)
     sys.stdin.read()
 """
+
+
+def test_a_signal_closes_no_file_that_is_being_written(tmp_path, monkeypatch):
+    """SQLite crashes otherwise: the thread that waits for signals closes it, while another one writes."""
+    begun, going_on = threading.Event(), threading.Event()
+    path = tmp_path / "parts.sqlite"
+    with records(path) as kept, ThreadPoolExecutor() as pool:
+        seal = kept._seal
+
+        def slow_seal(key, text):
+            begun.set()
+            assert going_on.wait(60.0)
+            return seal(key, text)
+
+        monkeypatch.setattr(kept, "_seal", slow_seal)
+        writing = pool.submit(kept.add, PARTS[0])
+        assert begun.wait(60.0)
+        closing_it = pool.submit(AT_STOP[-1])
+        with pytest.raises(TimeoutError):
+            closing_it.result(0.1)
+        going_on.set()
+        writing.result(60.0)
+        closing_it.result(60.0)
+        monkeypatch.setattr("softstart.store.STOPPING", begun)
+        with pytest.raises(KeyboardInterrupt):
+            kept.add(PARTS[1])
+    assert found_in(path)[0] == PARTS[0]
 
 
 def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
