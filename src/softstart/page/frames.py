@@ -38,10 +38,7 @@ from softstart.views.drawing import strategy_colours
 from softstart.views.numbers import unit
 from softstart.views.starts import no_stiffness, position_notes
 
-AS_SET_HERE = (
-    "Strategies count as they are set here; the report sets them for the limits, as does Parameter sheet in "
-    "Files for the selected one."
-)
+AS_SET_HERE = "Strategies count as they are set here; Checks sets them for the limits and adds them."
 QUICK_EVENTS = 8_000  # of a start while a slider is dragged; longer ones are computed after it
 QUICK = 0.010  # s, of a start that is computed at every step of a slider, even if no frame follows
 LONG = (math.inf, math.inf)

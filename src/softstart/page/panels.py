@@ -84,7 +84,8 @@ class ChecksPanel(JobPanel):
     spread = (0.4, 2.0)
     about = (
         "K_dyn of each strategy from both flanks and the middle of the gaps, margins to the limits, life "
-        "beside that under direct, and the quickest start that keeps the limits."
+        "beside that under direct, and the quickest start that keeps the limits. Strategies that keep them "
+        "when they are set for them can be added."
     )
 
     def task(self) -> Task:

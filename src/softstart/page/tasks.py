@@ -62,6 +62,9 @@ class TaskResult:
     copy: str = ""
 
 
+SET_FOR_LIMITS = ", set for limits"  # behind the name of a strategy whose parameters are
+
+
 def shown(*sheets: Sheet, first: bool = False) -> str:
     """The sheets of a terminal as HTML, figures `first` or last, with advice for the page."""
     from softstart.views.sheet import as_html
@@ -266,7 +269,10 @@ def identified(
 
 
 def checked(possible: Machine, controllers: Mapping[str, Controller], *, progress: Progress) -> TaskResult:
-    """Strategies from each start position, margins to limits, life under them, and the quickest start."""
+    """Strategies from each start position, margins to limits, life under them, and the quickest start.
+
+    Those that keep the limits when they are set for them, as `compare` does, are to be added.
+    """
     from softstart.optimal.optimize import optimize
     from softstart.views.checks import margins_sheet, positions_sheet
     from softstart.views.optima import optimum_sheet
@@ -275,6 +281,11 @@ def checked(possible: Machine, controllers: Mapping[str, Controller], *, progres
     progress(0.0, "limits")
     compared = compare(possible, list(controllers.values()))
     machine: Machine = compared.drive
+    set_for_limits = {
+        f"{label.removesuffix(SET_FOR_LIMITS)}{SET_FOR_LIMITS}": replace(controller, **row.setting)
+        for (label, controller), row in zip(controllers.items(), compared.rows, strict=True)
+        if row.setting
+    }
     progress(0.3, "start positions")
     unknown, runs, mistakes = None, {}, Mistakes()
     with mistakes.collect():
@@ -290,15 +301,18 @@ def checked(possible: Machine, controllers: Mapping[str, Controller], *, progres
         sheets.append(Sheet("Life of the shaft line", notes=list(error.sentences)))
     # the permissible torques of single shafts bound no optimum
     if not machine.limits or machine.limits.used_torque is not None:
-        return TaskResult(shown(*sheets))
+        return TaskResult(shown(*sheets), controllers=set_for_limits)
     progress(0.8, "the quickest start that keeps the limits")
     try:
         best = optimize(machine, limits=True)
     except (InputError, SimulationError) as error:
         notes = error.sentences if isinstance(error, InputError) else [str(error)]
-        return TaskResult(shown(*sheets, Sheet("The quickest start within limits", notes=notes)))
+        sheets.append(Sheet("The quickest start within limits", notes=notes))
+        return TaskResult(shown(*sheets), controllers=set_for_limits)
     label = f"quickest {best.end_time:.4g} s"
-    return with_optimum(best, label, *sheets, optimum_sheet(best, [row.run for row in compared.rows]))
+    sheets.append(optimum_sheet(best, [row.run for row in compared.rows]))
+    result = with_optimum(best, label, *sheets)
+    return replace(result, controllers={**set_for_limits, **result.controllers})
 
 
 def sheet_task(drive: Machine, controller: Controller, file: str, *, progress: Progress) -> TaskResult:

@@ -113,8 +113,26 @@ def test_checks_are_those_of_compare_fatigue_and_optimize(tmp_path: Path) -> Non
     lives = fatigue([row.run for row in rows])
     assert f"{float(f'{lives.ranked[0].relative:.3g}'):g}" in text  # three digits are shown
     best = optimize(drive, limits=True)
-    assert list(found.controllers) == [f"quickest {best.end_time:.4g} s"]
+    set_for = [f"{row.name}, set for limits" for row in rows if row.setting]
+    assert list(found.controllers) == [*set_for, f"quickest {best.end_time:.4g} s"]
     assert simulate(drive, profile_of_file(found, ".csv", tmp_path)).k_dyn == best.k_dyn
+
+
+def test_checks_add_what_compare_sets_for_the_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One answer of page and command line: what compare recommends can be had here, and set again."""
+
+    def no_optimum(*_: object, **__: object) -> None:
+        raise SimulationError("It is not asked for here.")
+
+    monkeypatch.setattr("softstart.optimal.optimize.optimize", no_optimum)
+    drive, label = CRANE.replace(permissible_torque=75.0), "speed-ramp, set for limits"
+    (row,) = compare(drive, ["speed-ramp"]).rows
+    assert row.setting
+    for name in ("speed-ramp", label):
+        found, *_ = done(tasks.checked, drive, {name: make_controller("speed-ramp")})
+        run = simulate(drive, found.controllers[label])
+        assert run.peak_torque == row.run.peak_torque <= 75.0
+    assert run.peak_torque < simulate(drive, "speed-ramp").peak_torque
 
 
 def test_checks_say_why_a_part_is_missing() -> None:
