@@ -62,7 +62,7 @@ class TaskResult:
     copy: str = ""
 
 
-SET_FOR_LIMITS = ", set for limits"  # behind the name of a strategy whose parameters are
+SET_FOR_LIMITS = ", set"  # behind the name of a strategy with parameters that are set for the limits
 
 
 def shown(*sheets: Sheet, first: bool = False) -> str:

@@ -113,7 +113,7 @@ def test_checks_are_those_of_compare_fatigue_and_optimize(tmp_path: Path) -> Non
     lives = fatigue([row.run for row in rows])
     assert f"{float(f'{lives.ranked[0].relative:.3g}'):g}" in text  # three digits are shown
     best = optimize(drive, limits=True)
-    set_for = [f"{row.name}, set for limits" for row in rows if row.setting]
+    set_for = [f"{row.name}, set" for row in rows if row.setting]
     assert list(found.controllers) == [*set_for, f"quickest {best.end_time:.4g} s"]
     assert simulate(drive, profile_of_file(found, ".csv", tmp_path)).k_dyn == best.k_dyn
 
@@ -125,7 +125,7 @@ def test_checks_add_what_compare_sets_for_the_limits(monkeypatch: pytest.MonkeyP
         raise SimulationError("It is not asked for here.")
 
     monkeypatch.setattr("softstart.optimal.optimize.optimize", no_optimum)
-    drive, label = CRANE.replace(permissible_torque=75.0), "speed-ramp, set for limits"
+    drive, label = CRANE.replace(permissible_torque=75.0), "speed-ramp, set"
     (row,) = compare(drive, ["speed-ramp"]).rows
     assert row.setting
     for name in ("speed-ramp", label):
