@@ -144,6 +144,7 @@ def test_a_drive_from_its_data_sheet(page: Any) -> None:
     assert page.get_by_test_id("sheet-load-reeving").is_hidden()
     for path, text in SHEET.items():
         page.get_by_test_id(f"sheet-{path.replace('.', '-')}").fill(text)
+    comes_to(trouble.is_hidden, True)  # what has been filled in is no longer missed
     page.get_by_test_id("sheet-use").click()
     sheet = DataSheet.from_settings(SHEET | {"load.machine": "travel"})
     drive = sheet.drive

@@ -81,6 +81,9 @@ class DataSheetPanel:
             self._troubles = Troubles("sheet")
             self._text = ui.label().classes("command lines").props('data-testid="sheet-drive" tabindex=0')
             self._text.set_visibility(False)
+        self._tried = False
+        for field in self._fields.values():
+            field.on_value_change(lambda: self._checked() if self._tried else None)
 
     def _about(self, machine: str) -> None:
         """Show the fields of this machine."""
@@ -88,7 +91,13 @@ class DataSheetPanel:
             row_of(self._fields[name]).set_visibility(machine in machines)
 
     def sheet(self) -> DataSheet | None:
-        """The contents of the form; None if something is wrong with them, which is shown then."""
+        """The contents of the form; None if something is wrong with them, which is shown from then on."""
+        self._tried = True
+        reveal(self._answer, "nearest")
+        return self._checked()
+
+    def _checked(self) -> DataSheet | None:
+        """Show what is wrong with the form, or the drive that follows."""
         machine = str(self._fields["machine"].value)
         written = {
             p.path: text
@@ -97,12 +106,11 @@ class DataSheetPanel:
             and (text := typed(p, str(self._fields[p.name].value)))
         }
         sheet: DataSheet | None = None
-        reveal(self._answer, "nearest")
         try:
             sheet = DataSheet.from_settings(answered(written))
             title, sentences = "Check these values.", sheet.plausibility_warnings
         except InputError as error:
-            title, sentences = "There is no drive yet.", list(error.sentences)
+            title, sentences = "These values make no drive yet.", list(error.sentences)
         self._troubles.say([*(in_words(one, LABELS) for one in sentences)], title)
         self._text.set_visibility(sheet is not None)
         self._text.set_text("" if sheet is None else sheet.drive_toml())
