@@ -235,13 +235,24 @@ def refuse_longer(run: Run, subject: str) -> None:
 
 
 def file_of(thing: Machine | Duty | TorqueProfile | Controller) -> str:
-    """The text of the file of a machine, duty, profile or strategy, as `softstart` writes it."""
+    """The text of the file of a machine, duty, profile or strategy, as `softstart` writes it.
+
+    Of a profile that is played with a sample period it has the samples, whose start is the same.
+    """
     if isinstance(thing, TorqueProfile):
         return thing.toml_text()
-    if isinstance(thing, Controller):
-        profile = profile_of(thing)
-        return strategy_text(thing) if profile is None else profile.toml_text()
-    return thing.to_toml()
+    if not isinstance(thing, Controller):
+        return thing.to_toml()
+    if (profile := profile_of(thing)) is None:
+        return strategy_text(thing)
+    if (period := float(getattr(thing, "period", None) or 0.0)) > 0.0:
+        if profile.after_contact is not None:
+            raise InputError(
+                f'strategy "{thing.name}": a profile that waits for the contact cannot be kept with a sample '
+                "period; set the period to 0."
+            )
+        profile = profile.sampled(period)
+    return profile.toml_text()
 
 
 def is_toml(text: str) -> bool:

@@ -22,7 +22,7 @@ from softstart.optimal.problem import Problem
 from softstart.optimal.result import LowerBound
 from softstart.project import Project, StoredOptimum
 from softstart.project.file import FIRST, LAST
-from softstart.project.parts import StoredMachine, player_of
+from softstart.project.parts import StoredMachine, file_of, player_of, strategy_of
 
 CRANE = Drive.load("crane-4amtkf")
 FAST = CRANE.replace(target_speed=60.0)
@@ -123,6 +123,21 @@ def test_starts_have_the_same_numbers() -> None:
         )
     assert simulate(CRANE, ramp(0.2)).k_dyn == simulate(again.single(), again.controller()).k_dyn
     assert again.replace(duty="hoist").single().duty == Duty.load("hoist")
+
+
+def test_a_profile_with_a_sample_period_is_kept_as_it_is_played(tmp_path: Path) -> None:
+    """From Python and from a file, of which the project does not keep the name."""
+    ramp = TorqueProfile([0.0, 0.1, 0.3], [10.0, 62.0, 55.0])
+    ramp.to_toml(tmp_path / "ramp.toml")
+    for given_as in ({"profile": ramp}, {"file": str(tmp_path / "ramp.toml")}):
+        player = make_controller("profile", {**given_as, "period": 0.05})
+        again = strategy_of(file_of(player), "again")
+        assert simulate(CRANE, again).k_dyn == pytest.approx(simulate(CRANE, player).k_dyn, rel=1e-12)
+    waiting = TorqueProfile([0.0], [30.0], after_contact=ramp)
+    again = strategy_of(file_of(player_of(waiting, "w")), "w")
+    assert simulate(CRANE, again).k_dyn == simulate(CRANE, player_of(waiting, "w")).k_dyn
+    with pytest.raises(InputError, match="set the period to 0"):
+        file_of(make_controller("profile", {"profile": waiting, "period": 0.05}))
 
 
 def test_an_optimum_is_checked_on_the_machine() -> None:
