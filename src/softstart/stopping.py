@@ -14,12 +14,17 @@ AT_STOP: list[Callable[[], object]] = []
 
 @contextmanager
 def at_stop(action: Callable[[], object]) -> Iterator[None]:
-    """Call `action` if the process is ended by `stop_now` during the block: remove a file, end a process."""
+    """Call `action` if the process is ended by `stop_now` during the block: remove a file, end a process.
+
+    So too if the end has begun and the block is left before it comes to `action`, which must bear being
+    called after the block.
+    """
     AT_STOP.append(action)
     try:
         yield
     finally:
-        AT_STOP.remove(action)
+        if not STOPPING.is_set():  # else the main thread, stopped by an error, would take it away
+            AT_STOP.remove(action)
 
 
 def stop_now(code: int) -> NoReturn:
