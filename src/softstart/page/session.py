@@ -53,7 +53,7 @@ PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are
 MAX_AT_TIME = 10.0  # times the settled time of direct: a longer time sets nothing else
 MAX_EVENTS_SET = 2_000  # of a start whose strategy is set for equal time: that takes 64 of them
 LONGEST_TIME = 40  # characters
-LONGEST_DUTY, OTHER_DUTY = 3.0, 0.5  # s of computation under the selected strategy, and any other one
+LONGEST_DUTY, OTHER_DUTY = 3.0, 0.5  # s of processor time under the selected strategy, and any other one
 TOO_LONG_DUTY = (
     "The duty takes too long to be carried out while you wait; give fewer repetitions or shorter steps."
 )
@@ -760,10 +760,10 @@ def _started(
 
 
 def _in_duty(machine: Machine, controller: Controller, plan: DutyPlan, seconds: float) -> DutyResult:
-    latest = time.perf_counter() + seconds
+    latest = time.thread_time() + seconds  # processes beside it must not change what is shown
 
     def watch(step: StepRun) -> None:
-        if time.perf_counter() > latest:
+        if time.thread_time() > latest:
             raise TimeoutError
 
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 from base64 import b64decode
 
 import numpy as np
@@ -177,6 +178,22 @@ def test_a_long_duty_waits_for_rest(page, monkeypatch):
     at_rest = [frame["duty"] for frame in page.frames.idle_frames() if frame and "duty" in frame]
     assert [shown["waits"] for shown in at_rest] == [False]
     assert at_rest[0]["k_dyn"] == run_duty(CONVEYOR, "direct", PLAIN).k_dyn
+
+
+def test_a_busy_machine_makes_no_duty_long(page, monkeypatch):
+    """What counts is the time that the processor spends on it, not the time that it waits for one."""
+
+    def waiting(*given, progress, **options):
+        def wait(step):
+            time.sleep(0.2)
+            progress(step)
+
+        return run_duty(*given, progress=wait, **options)
+
+    monkeypatch.setattr(sessions, "run_duty", waiting)
+    shown = page.duty()
+    assert not shown["waits"]
+    assert shown["k_dyn"] == run_duty(CONVEYOR, "direct", PLAIN).k_dyn
 
 
 def test_a_duty_out_of_sight_is_not_computed(page, monkeypatch):
