@@ -47,11 +47,12 @@ def duty_command(
 ) -> Output:  # fmt: skip
     """Run a machine through a duty: starts, stops, reversals, jogs, load changes, and the life of a shift.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
-    drive of the literature. The steps of one cycle are the tables [[duty]] of its file or of a file of their
-    own, [shift] says how often the cycle is repeated (see docs/reference/drive-file.md). Each step begins in
-    the state that the last one leaves. The [limits] are checked in every step, in both directions; damage is
-    counted from the second cycle on, by rainflow of the whole trace.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive (see: softstart drives) or chain;
+    by default the crane drive of the literature. The steps of one cycle are the tables [[duty]] of its file
+    or of a file of their own, [shift] says how often the cycle is repeated (see
+    docs/reference/drive-file.md). Each step begins in the state that the last one leaves. The [limits] are
+    checked in every step, in both directions; damage is counted from the second cycle on, by rainflow of the
+    whole trace.
 
     Options
     -------

@@ -47,10 +47,10 @@ def export_command(
 ) -> Output:  # fmt: skip
     """Export a strategy as C, Structured Text or FMU, or a machine as FMU.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
-    drive of the literature. The export has the source of the strategy with its guard, vectors of real starts,
-    a program that tests it, and a README on how to connect it. Parameters are rounded as on the parameter
-    sheet. Without --controller, --as fmu exports the machine itself.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive (see: softstart drives) or chain;
+    by default the crane drive of the literature. The export has the source of the strategy with its guard,
+    vectors of real starts, a program that tests it, and a README on how to connect it. Parameters are rounded
+    as on the parameter sheet. Without --controller, --as fmu exports the machine itself.
 
     Options
     -------

@@ -104,9 +104,10 @@ def optimize_command(
 ) -> Output:  # fmt: skip
     """Compute the torque profile with the lowest K_dyn for a start time, and a lower bound.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
-    default the crane drive of the literature. With --gaps, --inertias or --load-torques, one profile is
-    computed for all combinations. For a chain, the largest torque of all its shafts is minimised.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive (see: softstart drives) or chain
+    (crane-4-mass); by default the crane drive of the literature. With --gaps, --inertias or --load-torques,
+    one profile is computed for all combinations. For a chain, the largest torque of all its shafts is
+    minimised.
 
     Options
     -------
@@ -177,9 +178,9 @@ def pareto_command(
 ) -> Output:  # fmt: skip
     """Compute the lowest K_dyn over the start time, and compare the controllers with it.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass); by
-    default the crane drive of the literature. Each controller is compared with the optimum at its own start
-    time.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive (see: softstart drives) or chain
+    (crane-4-mass); by default the crane drive of the literature. Each controller is compared with the optimum
+    at its own start time.
 
     Options
     -------

@@ -68,13 +68,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 import click
 import numpy as np
 
 from softstart.chain.elements import LIBRARY as CHAINS
-from softstart.chain.machines import is_chain
+from softstart.chain.machines import is_chain_text
 from softstart.chain.model import Chain
 from softstart.cli.completion import one_of
 from softstart.drive import Drive, library
@@ -84,17 +84,18 @@ from softstart.drive.machine import Machine
 from softstart.drive.model import OF_DUTY
 from softstart.errors import InputError, SimulationError
 from softstart.hints import did_you_mean
-from softstart.input.documents import DocumentTable, parsed
+from softstart.input.documents import DocumentTable, is_project, parsed
 from softstart.input.files import ABSENT, read_text, refusal_of
 from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import read_settings
 from softstart.input.parameters import Wording
 from softstart.plugins import controller_names
-from softstart.quantities import RefusedError, to_si, values_in, whole_number
+from softstart.quantities import RefusedError, show, to_si, values_in, whole_number
 from softstart.views.numbers import seen_at
 
 if TYPE_CHECKING:
     from softstart.identification.result import Identification
+    from softstart.project import Project
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 Load = Callable[[str, Sequence[str]], Any]
@@ -153,36 +154,95 @@ def count(least: int = 1, most: int = 10**15) -> Reader:
 
 def read_drive(name: str, settings: Sequence[str]) -> Drive:
     """The one drive asked for, with its changes."""
-    return _at_one_end(_drive(name, settings))
-
-
-def _at_one_end(drive: Drive) -> Drive:
-    """The drive, for commands that take one stiffness."""
-    if drive.soft is not None:
-        print(
-            "softstart: warning: no stiffness is known; this command computes with the stiff end of the "
-            "range only (compare, tune and report take both ends).",
-            file=sys.stderr,
-        )
-    return drive
-
-
-def _drive(name: str, settings: Sequence[str]) -> Drive:
-    """The drive of a file or a data sheet."""
-    if is_chain(name):
+    file = _file(name)
+    if is_chain_text(file.text):
         remedy = f'"softstart reduce {name} --out DIR" writes the two masses that stand for it'
-        raise InputError(f'"{name}": this is a chain, and a drive is needed here; {remedy}.')
-    sheet = _data_sheet(name)
-    if sheet is None:
-        return Drive.load(name).with_settings(settings) if settings else Drive.load(name)
+        if file.project is not None:
+            remedy = "choose a drive of the project"
+        raise InputError(f"{file.subject}: this is a chain, and a drive is needed here; {remedy}.")
+    machine = _made(file, settings)
+    assert isinstance(machine, Drive)
+    return _at_one_end(machine)
+
+
+def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
+    """The one drive, or the chain, asked for, with its changes."""
+    machine = read_as_known(name, settings)
+    return _at_one_end(machine) if isinstance(machine, Drive) else machine
+
+
+def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain:
+    """The one drive, or the chain, asked for, as far as it is known; of a project the one chosen there."""
+    known = (*drive_names(), *CHAINS.names())
+    # a single word that is no file was meant as the name of a shipped machine
+    if re.fullmatch(r"[\w-]+", name) and name not in known and refusal_of(name) == ABSENT:
+        hint = did_you_mean(name, known)
+        raise InputError(f'"{name}": no such file, and no shipped drive or chain has this name; {hint}')
+    return _made(_file(name), settings)
+
+
+def read_project(name: str) -> Project | None:
+    """The project of the file of this name; None if it is of another kind, or cannot be read."""
+    if name in (*drive_names(), *CHAINS.names()):
+        return None
+    with suppress(RefusedError):  # told by the reader of machines
+        if is_project(text := read_text(name)):
+            from softstart.project import Project
+
+            return Project.read(text, name, Path(name).parent)
+    return None
+
+
+class _File(NamedTuple):
+    """The text of a machine's file, what it is called in sentences, and the project that holds it."""
+
+    text: str
+    where: str
+    project: Project | None = None
+
+    @property
+    def subject(self) -> str:
+        return self.where if self.project is not None else show(self.where)
+
+
+def _file(name: str) -> _File:
+    """That of a machine by its name or path; of a project that of the machine chosen there."""
+    if (project := read_project(name)) is None:
+        shipped = CHAINS if name in CHAINS.names() and name not in drive_names() else library
+        return _File(*shipped.find(name))
+    try:
+        stored = project.stored()
+    except InputError as error:
+        raise InputError(f"{name}: {one}" for one in error.sentences) from None
+    return _File(stored.file, f'{name}: machine "{stored.name}"', project)
+
+
+def _made(file: _File, settings: Sequence[str]) -> Drive | Chain:
+    """The machine of a file with its changes, and with the duty that its project has chosen."""
+    if file.project is None or not file.project.duty:
+        return _changed(file, settings)
+    of_duty = [one for one in settings if OF_DUTY.match(one)]
+    machine = _changed(file, [one for one in settings if one not in of_duty])
+    changed: Drive | Chain = file.project.with_duty(machine, read_changes(of_duty))
+    return changed
+
+
+def _changed(file: _File, settings: Sequence[str]) -> Drive | Chain:
+    """The machine of a file, of a data sheet too, with its changes."""
+    text, where, _ = file
+    if is_chain_text(text):
+        return Chain.from_toml(text, where=where, also=read_changes(settings))
+    if not _is_data_sheet(text):
+        drive = Drive.from_toml(text, where=where)
+        return drive.with_settings(settings) if settings else drive
     # its own keys are those of the sheet, at their own parts
     paths = {p.path for p in DataSheet.PARAMETERS.values()}
     sheet_settings = [one for one in settings if one.partition("=")[0].strip() in paths]
     settings = [one for one in settings if one not in sheet_settings]
-    data_sheet = DataSheet.from_toml(sheet, where=name, also=read_changes(sheet_settings))
+    data_sheet = DataSheet.from_toml(text, where=where, also=read_changes(sheet_settings))
+    writes = "" if file.project is not None else f'; "softstart init {where} --out FILE" writes the drive'
     print(
-        f'"{name}" is a data sheet, converted to a drive ({data_sheet.motion}); "softstart init {name} --out '
-        'FILE" writes the drive.',
+        f"{file.subject} is a data sheet, converted to a drive ({data_sheet.motion}){writes}.",
         file=sys.stderr,
     )
     for warning in data_sheet.motion_warnings:
@@ -194,31 +254,21 @@ def _drive(name: str, settings: Sequence[str]) -> Drive:
     return drive.replace(assumed=still_assumed(drive, drive_settings))
 
 
-def _data_sheet(name: str) -> str | None:
-    """The text of the file of this name, if it is a data sheet."""
-    if name not in drive_names() and refusal_of(name) is None:
-        with suppress(RefusedError, InputError):  # told by the reader of drives
-            text = read_text(name)
-            return text if DataSheet.describes(parsed(text, Wording(name), "a drive")) else None
-    return None
+def _is_data_sheet(text: str) -> bool:
+    with suppress(InputError):  # told by the reader of drives
+        return DataSheet.describes(parsed(text, Wording(), "a drive"))
+    return False
 
 
-def read_machine(name: str, settings: Sequence[str]) -> Drive | Chain:
-    """The one drive, or the chain, asked for, with its changes."""
-    machine = read_as_known(name, settings)
-    return _at_one_end(machine) if isinstance(machine, Drive) else machine
-
-
-def read_as_known(name: str, settings: Sequence[str]) -> Drive | Chain:
-    """The one drive, or the chain, asked for, as far as it is known."""
-    if is_chain(name):
-        return Chain.load(name, also=read_changes(settings))
-    known = (*drive_names(), *CHAINS.names())
-    # a single word that is no file was meant as the name of a shipped machine
-    if re.fullmatch(r"[\w-]+", name) and name not in known and refusal_of(name) == ABSENT:
-        hint = did_you_mean(name, known)
-        raise InputError(f'"{name}": no such file, and no shipped drive or chain has this name; {hint}')
-    return _drive(name, settings)
+def _at_one_end(drive: Drive) -> Drive:
+    """The drive, for commands that take one stiffness."""
+    if drive.soft is not None:
+        print(
+            "softstart: warning: no stiffness is known; this command computes with the stiff end of the "
+            "range only (compare, tune and report take both ends).",
+            file=sys.stderr,
+        )
+    return drive
 
 
 def read_machine_or_identified(name: str, settings: Sequence[str]) -> Drive | Chain | Identification:
@@ -408,8 +458,9 @@ def typed_machine() -> str:
 
 
 def machine_argument(
-    name: str, read: Load, names: Callable[[], Iterable[str]], default: str, tables: Iterable[DocumentTable]
-) -> Decorator:
+    name: str, read: Load, names: Callable[[], Iterable[str]], default: str | Callable[[], str],
+    tables: Iterable[DocumentTable],
+) -> Decorator:  # fmt: skip
     """A TOML file or the name of a shipped one, with --set; the command gets `read(name, texts of --set)`."""
 
     def load(typed: str, _: str) -> object:
@@ -426,9 +477,9 @@ def machine_argument(
     return lambda command: argument(set_option(tables)(command))
 
 
-def of_drive(read: Load) -> Decorator:
+def of_drive(read: Load, default: str | Callable[[], str] = DEFAULT_DRIVE) -> Decorator:
     """DRIVE, a file or the name of a shipped one, with --set."""
-    return machine_argument("drive", read, drive_names, DEFAULT_DRIVE, Drive.TABLES)
+    return machine_argument("drive", read, drive_names, default, Drive.TABLES)
 
 
 def of_file(kind: type[ParameterFile], default: str) -> Decorator:

@@ -11,7 +11,7 @@ import click
 
 from softstart.cli import options
 from softstart.cli.options import command, option
-from softstart.cli.report import written_report
+from softstart.cli.report import in_project, written_report
 from softstart.cli.running import Output, answers, attributed, working
 from softstart.cli.serve import serve_page
 from softstart.errors import InputError
@@ -103,17 +103,7 @@ def _shown(project: Project, path: str, check: bool = False) -> tuple[Any, Any]:
 
 
 def _report(project: Project, progress: Any, typed: str, **steps: Any) -> Report:
-    from softstart.project.parts import refuse_longer
     from softstart.reporting import report
-    from softstart.start.simulation import simulate
 
-    machine, chosen = project.single(), project.strategy
-    if chosen in [one.name for one in project.strategies]:
-        start = simulate(project.single(), project.controller())
-        refuse_longer(start, f'strategy "{chosen}"')
-    controllers = [project.controller()] if chosen else None
-    beside = project.single(project.beside) if project.beside else None
-    return report(
-        machine, controllers=controllers, command=typed, progress=progress, project=project, beside=beside,
-        **steps,
-    )  # fmt: skip
+    chosen = in_project(project)
+    return report(project.single(), command=typed, progress=progress, project=project, **chosen, **steps)

@@ -5,17 +5,14 @@ from __future__ import annotations
 import threading
 import webbrowser
 from collections.abc import Sequence
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from softstart.cli import options
-from softstart.cli.options import command, drive_names, option
+from softstart.cli.options import command, option
 from softstart.cli.running import working
 from softstart.errors import InputError
-from softstart.input.files import read_text, refusal_of
 from softstart.page.address import Address
 from softstart.page.serve import check_installed, listening, run_server
-from softstart.quantities import RefusedError
 
 if TYPE_CHECKING:
     from softstart.drive.machine import Machine
@@ -24,16 +21,11 @@ if TYPE_CHECKING:
 
 def _read(name: str, settings: Sequence[str]) -> Machine | Project:
     """A machine as other commands read it, or a project."""
-    if name not in drive_names() and refusal_of(name) is None:
-        from softstart.project import Project
-        from softstart.project.parts import kind_of
-
-        kind = ""
-        with suppress(InputError, RefusedError):  # told by the reader of machines
-            kind = kind_of(read_text(name), name)
-        if kind == "project":
-            return Project.open(name)
-    return options.read_as_known(name, settings)
+    if (project := options.read_project(name)) is None:
+        return options.read_as_known(name, settings)
+    if settings:
+        raise InputError(f'--set "{settings[0]}": the page opens the whole project; change it there.')
+    return project
 
 
 @command("serve")

@@ -44,11 +44,11 @@ def compare_command(
 ) -> Output:  # fmt: skip
     """Compare strategies on a drive or a chain, or on two of them side by side.
 
-    DRIVE is a TOML file, the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like), or the folder of an identification, which adds confidence intervals; by default the crane
-    drive of the literature. A strategy is a name (see: softstart controllers), path/to/file.py:Class, a file
-    of tuned gains, or a torque profile (.csv). BESIDE is another machine of the same kind: one table and one
-    figure show both.
+    DRIVE is a TOML file, also of a project, the name of a shipped drive (see: softstart drives) or chain
+    (crane-4-mass, tractor-like), or the folder of an identification, which adds confidence intervals; by
+    default the crane drive of the literature. A strategy is a name (see: softstart controllers),
+    path/to/file.py:Class, a file of tuned gains, or a torque profile (.csv). BESIDE is another machine of the
+    same kind: one table and one figure show both.
 
     Options
     -------
@@ -128,9 +128,9 @@ def simulate_command(
 ) -> Output:  # fmt: skip
     """Simulate one start of a drive or a chain.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain (crane-4-mass,
-    tractor-like); by default the crane drive of the literature. For a motor torque over speed (DOL,
-    star-delta) see docs/howto/motor-torque-over-speed.md.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive (see: softstart drives) or chain
+    (crane-4-mass, tractor-like); by default the crane drive of the literature. For a motor torque over speed
+    (DOL, star-delta) see docs/howto/motor-torque-over-speed.md.
 
     Options
     -------
@@ -180,11 +180,11 @@ def fatigue_command(
 ) -> Output:  # fmt: skip
     """Estimate the fatigue life of the shaft line under each strategy.
 
-    DRIVE is a TOML file or the name of a shipped drive (see: softstart drives) or chain; by default the crane
-    drive of the literature. Cycles are counted by the rainflow method. The tables [limits] and
-    [limits.fatigue] of the file give the S-N curve, the starts per hour and the required life; without them
-    lives are relative to that of direct. Every shaft needs damping; those of a chain are evaluated
-    separately.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive (see: softstart drives) or chain;
+    by default the crane drive of the literature. Cycles are counted by the rainflow method. The tables
+    [limits] and [limits.fatigue] of the file give the S-N curve, the starts per hour and the required life;
+    without them lives are relative to that of direct. Every shaft needs damping; those of a chain are
+    evaluated separately.
 
     Options
     -------
@@ -220,10 +220,10 @@ def fatigue_command(
 def linear_command(*, drive: Machine, controller: str, params: dict[str, str]) -> Output:
     """Linearise the control loop: stability margins, modes, limit cycles.
 
-    DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
-    drive of the literature. The controller's step function is linearised at an instant of its start at which
-    all gaps are closed; the loop is broken at the torque demand. Limit cycles through the gap of a drive are
-    predicted by the describing function.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive or chain (see: softstart drives);
+    by default the crane drive of the literature. The controller's step function is linearised at an instant
+    of its start at which all gaps are closed; the loop is broken at the torque demand. Limit cycles through
+    the gap of a drive are predicted by the describing function.
 
     Options
     -------

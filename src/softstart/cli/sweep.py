@@ -61,8 +61,8 @@ def sweep_command(
 ) -> Output:  # fmt: skip
     """Simulate a grid of drives and controllers of any size.
 
-    DRIVE is a TOML file or the name of a shipped drive or chain (see: softstart drives); by default the crane
-    drive of the literature. The results are a Zarr store that xarray opens.
+    DRIVE is a TOML file, also of a project, or the name of a shipped drive or chain (see: softstart drives);
+    by default the crane drive of the literature. The results are a Zarr store that xarray opens.
 
     Options
     -------

@@ -113,9 +113,9 @@ def tune_command(
 ) -> Output:  # fmt: skip
     """Tune a controller for each gap and load inertia, and one robust set of gains.
 
-    DRIVE is a TOML file, the name of a shipped drive or chain (see: softstart drives), or the folder of an
-    identification: the gains are then robust over its confidence region. Those of a drive whose
-    stiffness is not known are judged at both ends of its range. Of a chain the torques of all shafts
+    DRIVE is a TOML file, also of a project, the name of a shipped drive or chain (see: softstart drives), or
+    the folder of an identification: the gains are then robust over its confidence region. Those of a drive
+    whose stiffness is not known are judged at both ends of its range. Of a chain the torques of all shafts
     count. By default the crane drive of the literature. The gains are written as files that every command
     accepts as a controller: softstart simulate DRIVE --controller DIR/robust.toml
 

@@ -10,6 +10,7 @@ import json
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from softstart.hints import did_you_mean, nearest, term
 from softstart.input.parameters import Mistake, Parameter, Wording, meant_by
 from softstart.quantities import doubtful_comma, shortest, show
 
+PROJECT = "# A project of softstart"  # how the file of one begins
 MOST_TEXT = 1_000_000  # characters of a TOML file: what is longer takes longer than anyone waits
 # a key with this many dots takes memory by their square, and no table is nested like that
 _DEEP = re.compile(r"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){9}[\w"'-]{0,9}""")
@@ -103,6 +105,19 @@ def kind_of_document(document: Mapping[str, Any]) -> str:
     if {"kind", "profile"} & document.keys():
         return "strategy"
     return "duty" if "duty" in document and not {"motor", "shaft", "mass"} & document.keys() else "machine"
+
+
+def is_project(text: str) -> bool:
+    """Whether a text is meant as a project, whole or not: by its first line, or by its tables.
+
+    >>> is_project("[choice]"), is_project("[motor]"), is_project(PROJECT + "\\n[cho")
+    (True, False, True)
+    """
+    if text.startswith(PROJECT):
+        return True
+    with suppress(InputError):  # no TOML
+        return kind_of_document(parsed(text, Wording(), "a machine")) == "project"
+    return False
 
 
 def _invalid(message: str, text: str) -> tuple[str, str]:

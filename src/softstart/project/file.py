@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import nullcontext, suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, cast
 
 from softstart.chain.machines import MachineLike, as_machine, known_from, refuse_other_kind
 from softstart.controller.base import Controller
@@ -20,7 +20,7 @@ from softstart.controller.finding import make_controller
 from softstart.drive import PARAMETERS, Duty, Machine
 from softstart.errors import InputError, Mistakes
 from softstart.hints import did_you_mean, nearest
-from softstart.input.documents import DocumentTable, parsed
+from softstart.input.documents import PROJECT, DocumentTable, parsed
 from softstart.input.files import file_text, write_whole
 from softstart.input.parameter_file import ParameterFile
 from softstart.input.parameter_set import Number, ParameterSet, Rows, component, parameter
@@ -33,7 +33,7 @@ from softstart.quantities import show
 
 LOGOS = {".png": "image/png", ".jpg": "image/jpeg", ".jpeg": "image/jpeg", ".svg": "image/svg+xml"}
 VERSION = 1
-FIRST = "# A project of softstart (softstart project open FILE), whole if its last line is the end of it.\n"
+FIRST = f"{PROJECT} (softstart project open FILE), whole if its last line is the end of it.\n"
 LAST = "# end of the project\n"
 KINDS = {"machine": "machines", "strategy": "strategies", "optimum": "optima", "duty": "duties"}
 MOST_LOGO = 500_000  # bytes: a report is sent by mail
@@ -296,17 +296,41 @@ class Project(ParameterFile, what="a project"):
         """What has a controller: own strategies, then optima."""
         return (*self.strategies, *self.optima)
 
-    def single(self, name: str = "") -> Machine:
-        """A machine by its name, by default the chosen one or the only one, with the duty chosen."""
-        files = {one.name: one.file for one in self.machines}
-        name = name or self.machine or (next(iter(files)) if len(files) == 1 else "")
-        if name not in files:
+    def stored(self, name: str = "") -> StoredMachine:
+        """The file of a machine by its name, by default of the chosen one or the only one.
+
+        >>> project = Project.new("crane-4amtkf", "hoist-15kw")
+        >>> project.stored().name, project.stored("hoist-15kw").name
+        ('crane-4amtkf', 'hoist-15kw')
+        >>> Project(machines=project.machines).stored()
+        Traceback (most recent call last):
+        softstart.errors.InputError: the project has 2 machines ("crane-4amtkf", "hoist-15kw"), and none ...
+        """
+        files = {one.name: one for one in self.machines}
+        name = name or self.machine
+        if not (name or files):
+            raise InputError("the project has no machine; load one on the page, or add a table [[machine]].")
+        if not name and len(files) > 1:
+            raise InputError(
+                f"the project has {len(files)} machines ({', '.join(map(show, files))}), and none is chosen; "
+                f"write [choice] machine = {show(next(iter(files)))} in its file, or choose one on the page."
+            )
+        if name and name not in files:
             raise InputError(
                 f'[choice] machine = "{name}": the project has no such machine; {_meant(name, files)}'
             )
-        machine: Any = known_from(files[name], f'machine "{name}"')
+        return files[name or next(iter(files))]
+
+    def single(self, name: str = "") -> Machine:
+        """A machine by its name, by default the chosen one or the only one, with the duty chosen."""
+        stored = self.stored(name)
+        return self.with_duty(known_from(stored.file, f'machine "{stored.name}"'))
+
+    def with_duty(self, machine: Machine, also: Mapping[str, object] | None = None) -> Any:
+        """The machine with the duty that is chosen, if one is, after changes of the duty by path."""
         text = next((one.file for one in self.duties if one.name == self.duty), "")
-        return machine.replace(duty=Duty.read_for(machine, text, f'duty "{self.duty}"')) if text else machine
+        where, changed = f'duty "{self.duty}"', cast("Any", machine)
+        return changed.replace(duty=Duty.read_for(machine, text, where, also)) if text else machine
 
     @property
     def name(self) -> str:
