@@ -22,6 +22,6 @@ except KeyboardInterrupt:
 
 def test_what_is_left_while_the_process_is_being_ended_is_still_done():
     done = subprocess.run(
-        [sys.executable, "-c", LEFT], check=False, capture_output=True, text=True, timeout=60
+        [sys.executable, "-c", LEFT], check=False, capture_output=True, text=True, timeout=300
     )
     assert (done.returncode, done.stdout.split(), done.stderr) == (130, ["inner", "outer"], "")

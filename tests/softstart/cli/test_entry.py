@@ -13,7 +13,6 @@ import sys
 
 import click
 import pytest
-from tests.patience import patient
 
 from softstart import __version__
 from softstart.cli.commands import COMMANDS, cli, first_sentences
@@ -162,7 +161,7 @@ STUCK = """
         os.kill(os.getpid(), signal.{name})
         for _ in range(3):  # as compiled code does: no instruction of Python in between
             try:
-                ctypes.CDLL(None).sleep(20)
+                ctypes.CDLL(None).sleep(600)
             except KeyboardInterrupt:
                 pass
 """
@@ -174,7 +173,7 @@ def ended(work: str, name: str) -> subprocess.CompletedProcess[str]:
         [sys.executable, "-c", code],
         capture_output=True,
         text=True,
-        timeout=patient(15.0),
+        timeout=300,
         check=False,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
@@ -211,6 +210,6 @@ def test_while_it_begins_there_is_no_traceback_either() -> None:
         "sys.exit(main())\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (130, "", INTERRUPTED)

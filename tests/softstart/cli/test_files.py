@@ -271,14 +271,14 @@ def test_a_controller_fitted_to_another_drive(place, as_json):
 
 
 def test_a_front_goes_on_where_it_was_interrupted(command, place, as_json):
-    state, deadline = place / "front" / "pareto.sqlite", time.monotonic() + 120
+    state, deadline = place / "front" / "pareto.sqlite", time.monotonic() + 300
     line = ("pareto", *SIXTY, "--start-times", "0.245:0.4:40", "--controllers", "direct", "--out", "front")
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     process = subprocess.Popen([*command, *line], start_new_session=True, **pipes)
     while time.monotonic() < deadline and len(parts_in(state)) < 2:
         time.sleep(0.005)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does it: to the workers too
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     assert (process.returncode, out, "Traceback" in err) == (130, "", False), err
     assert "finished points are kept in front/pareto.sqlite" in err
     assert os.listdir(place / "front") == ["pareto.sqlite"]

@@ -229,7 +229,7 @@ def test_it_serves_until_it_is_interrupted_and_leaves_nothing(tmp_path):
         line = server.stdout.readline()
         assert line.startswith("softstart is at http://127.0.0.1:")
         url = line.split()[3]
-        with urllib.request.urlopen(url, timeout=20) as got:
+        with urllib.request.urlopen(url, timeout=120) as got:
             text = got.read().decode()
             (cookie,) = got.headers.get_all("set-cookie")
             assert re.fullmatch(r"softstart-\d+=[\w.=-]+; path=/; httponly; samesite=strict", cookie)
@@ -247,11 +247,11 @@ def test_it_serves_until_it_is_interrupted_and_leaves_nothing(tmp_path):
             (upgrade % (port, b"http://evil.example"), b" 403 "),
             (upgrade % (port, own), b" 101 "),
         ):
-            with socket.create_connection(("127.0.0.1", port), timeout=10) as raw:
+            with socket.create_connection(("127.0.0.1", port), timeout=120) as raw:
                 raw.sendall(request)
                 assert answer in raw.recv(200)
         server.send_signal(signal.SIGTERM)
-        assert server.wait(timeout=60) == 130
+        assert server.wait(timeout=120) == 130
         errors = server.stderr.read()
         assert "interrupted" in errors.splitlines()[0]
         assert len(errors.splitlines()) == 1

@@ -50,7 +50,7 @@ class Sweeping:
 
     def wait_for(self, folder: Path, chunks: int, process: subprocess.Popen[str]) -> None:
         """Until so many chunks are finished."""
-        deadline = time.monotonic() + 120
+        deadline = time.monotonic() + 300
         while len(self.finished(folder)) < chunks:
             assert process.poll() is None, process.communicate()
             assert time.monotonic() < deadline

@@ -31,7 +31,7 @@ class Cluster:
         return self.processes[-1]
 
     def address(self):
-        deadline = time.monotonic() + 60
+        deadline = time.monotonic() + 300
         while time.monotonic() < deadline:
             try:
                 return json.loads((self.folder / "scheduler.json").read_text())["address"]
@@ -64,13 +64,19 @@ def cluster(tmp_path_factory):
 
 @pytest.mark.slow
 def test_a_cluster_without_workers_is_named(cluster, monkeypatch):
-    monkeypatch.setattr(parallel, "CLUSTER_TIMEOUT", 1.0)
+    client = pytest.importorskip("distributed").Client
+    waits = client.wait_for_workers
+    # the scheduler may take longer to answer
+    monkeypatch.setattr(client, "wait_for_workers", lambda self, count, timeout: waits(self, count, 1.0))
     with pytest.raises(InputError, match="it has no worker; start some"):
         sweep(CRANE, "direct", {"gap": [0.5, 1.0]}, scheduler=cluster.address())
 
 
 @pytest.mark.slow
-def test_two_workers_of_which_one_is_killed_find_the_same(cluster, sweeping, uninterrupted, tmp_path):
+def test_two_workers_of_which_one_is_killed_find_the_same(
+    cluster, sweeping, uninterrupted, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(parallel, "CLUSTER_TIMEOUT", 300.0)  # the workers may only just begin
     address = cluster.with_workers(2)
     killed = []
 
