@@ -227,8 +227,10 @@ class Jobs:
     def _worker(self) -> Worker:
         with self._lock:
             spare, self._spare = self._spare, None
-        if spare is not None and spare.alive:
-            return spare
+        if spare is not None:
+            if spare.alive:
+                return spare
+            spare.kill()
         return Worker(self.modules, NICENESS)
 
 

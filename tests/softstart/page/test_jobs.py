@@ -16,6 +16,7 @@ import pytest
 
 from softstart import InputError
 from softstart.page.jobs import MISTAKE, NICENESS, OUT_OF_MEMORY, Job, Jobs, JobState
+from softstart.stopping import AT_STOP
 
 HERE = Path(__file__).parent
 
@@ -153,6 +154,7 @@ def test_failures_are_sentences(
 
 def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
     """A dead one is replaced unnoticed; none outlives the server."""
+    before = len(AT_STOP)
     jobs = Jobs(limit=1, modules=["works_for_jobs"])
     try:
         jobs.warm()
@@ -165,6 +167,7 @@ def test_a_process_waits_for_the_next_job(works: Any, tmp_path: Path) -> None:
     finally:
         jobs.end()
     assert not alive(last)
+    assert len(AT_STOP) == before  # nor does anything wait to be ended
 
 
 SERVER = """
