@@ -20,7 +20,7 @@ from softstart.kernel import records as rec
 from softstart.page import links, machines
 from softstart.page.duty import fields_of, values_of
 from softstart.page.duty_frames import duty_view, json_number
-from softstart.page.machines import STRATEGY, Axes, FormField
+from softstart.page.machines import NAME, STRATEGY, Axes, FormField
 from softstart.page.sentences import (
     Value,
     differences,
@@ -95,7 +95,8 @@ class FrameBuilder:
             return
         self._origin, self._fields_of = origin, (label, type(controller))
         try:
-            self._strategy = machines.strategy_entries(controller, origin, label)
+            own = label in self.session.added
+            self._strategy = machines.strategy_entries(controller, origin, label, own)
         except Exception as error:  # a controller is anyone's code; its start has said what is wrong
             sentence_of(error)  # which is logged
             self._strategy = {}
@@ -197,20 +198,22 @@ class FrameBuilder:
         """The values with which the selected strategy starts; marks at its defaults and at tuned values."""
         session, inputs, units = self.session, self.session.inputs, self.session.inputs.units
         controller = inputs.controllers[inputs.selected]
+        fields: dict[str, Frame] = {NAME: {"text": inputs.selected}} if NAME in self._strategy else {}
         fitted = None if result.run is None else result.run.design_drive
         try:
             default = controller.defaults(inputs.machine.design_drive if fitted is None else fitted)
         except Exception as error:  # as in `follow`
             sentence_of(error)
-            return {}
+            return fields
         tuned = [
             (label, known.run.controller)
             for label, other in inputs.controllers.items()
             if isinstance(other, Tuned) and type(other.controller) is type(controller)
             and (known := session.ready(label)) is not None and known.run is not None
         ]  # fmt: skip
-        fields = {}
         for path, entry in self._strategy.items():
+            if path == NAME:
+                continue
             name = path.removeprefix(STRATEGY)
             setting = getattr(controller, name)
             value = default.get(name) if setting is None else setting
@@ -391,7 +394,7 @@ def numbers(values: Vector) -> list[float | None]:
 
 def described(entry: FormField, units: Units) -> Frame:
     """A field as the browser builds it; `text` says that it takes words alone."""
-    text = not (entry.unit or entry.choices or entry.path.startswith(STRATEGY))
+    text = entry.path == NAME or not (entry.unit or entry.choices or entry.path.startswith(STRATEGY))
     return vars(entry) | {
         "unit": unit(entry.seen(units).of(entry.unit)),
         "scale": entry.scale is not None,

@@ -31,6 +31,7 @@ GAPS, INERTIAS = 25, 17  # of the map
 MAP_EVENTS = 20_000  # of one start of a map; a cell beyond stays empty
 MOST_DAMPING = 0.2  # damping ratio of a shaft, by its slider: geared trains have 0.01 to 0.06
 STRATEGY = "strategy."  # before the names of the parameters of the selected strategy
+NAME = STRATEGY + "name"  # which is no parameter of any controller
 DELTA = "\N{GREEK SMALL LETTER DELTA}"
 
 HEAD = "Units"  # the group that stands in the head of the page
@@ -238,8 +239,12 @@ def page_parameters(controller: Controller) -> list[ControllerParameter]:
     ]  # fmt: skip
 
 
-def strategy_entries(controller: Controller, origin: Machine, label: str) -> Mapping[str, FormField]:
+def strategy_entries(
+    controller: Controller, origin: Machine, label: str, own: bool = False
+) -> Mapping[str, FormField]:
     """The fields of a strategy, those without a slider or choice last; sliders go as far as tuning would.
+
+    One of the user's `own` has a name that can be changed.
 
     >>> from softstart.controller import make_controller
     >>> entries = strategy_entries(make_controller("s-curve"), Drive.load("crane-4amtkf"), "s-curve")
@@ -255,9 +260,11 @@ def strategy_entries(controller: Controller, origin: Machine, label: str) -> Map
         if low < high:
             scales[search.name] = Scale(low, high, search.logarithmic and low > 0.0)
     main = {p.name for p in parameters if p.name in scales or p.choices} or {p.name for p in parameters}
-    return {
+    title, meaning = f"parameters of {label}", "name of the strategy; write for example slow ramp"
+    name = FormField(NAME, title, "name", "", "", meaning, "slow ramp")
+    return ({NAME: name} if own else {}) | {
         STRATEGY + p.name: FormField(
-            STRATEGY + p.name, f"parameters of {label}" if p.name in main else MORE,
+            STRATEGY + p.name, title if p.name in main else MORE,
             p.name.replace("_", " "), "", p.unit, f"{p.meaning}; default: {p.default_text or 'fixed'}",
             "a value, or nothing for the default", p.choices, (), True, scales.get(p.name),
         )

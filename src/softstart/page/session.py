@@ -22,10 +22,11 @@ from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.hints import nearest
 from softstart.page.duty import PATH, DutyPlan, plan_of, with_duty
-from softstart.page.machines import STRATEGY, startable, with_typed_changes, without
+from softstart.page.machines import NAME, STRATEGY, startable, with_typed_changes, without
 from softstart.page.sentences import FAILED_START, field_labels, sentence_of
+from softstart.plugins import controller_names
 from softstart.project import Project, StoredOptimum
-from softstart.project.parts import refuse_longer
+from softstart.project.parts import refuse_longer, renamed
 from softstart.quantities import Units, seen_from
 from softstart.start.comparison import (
     REFERENCE,
@@ -52,7 +53,7 @@ MAX_UNDO = 200
 PAUSE = 1.0  # s; changes of one slider that follow one another more quickly are one step
 MAX_AT_TIME = 10.0  # times the settled time of direct: a longer time sets nothing else
 MAX_EVENTS_SET = 2_000  # of a start whose strategy is set for equal time: that takes 64 of them
-LONGEST_TIME = 40  # characters
+LONGEST_TIME, LONGEST_LABEL = 40, 60  # characters
 LONGEST_DUTY, OTHER_DUTY = 3.0, 0.5  # s of processor time under the selected strategy, and any other one
 TOO_LONG_DUTY = (
     "The duty takes too long to be carried out while you wait; give fewer repetitions or shorter steps."
@@ -277,7 +278,9 @@ class Session:
         >>> session.inputs.machine.gap
         0.5
         """
-        if path.startswith(STRATEGY):
+        if path == NAME:
+            self.rename(self.inputs.selected, str(value or ""))
+        elif path.startswith(STRATEGY):
             self.set_parameter(path.removeprefix(STRATEGY), value, gesture)
         elif path.startswith(PATH):
             self.set_duty(self.inputs.plan.changed(path, value), gesture)
@@ -430,7 +433,7 @@ class Session:
         A label that exists already is replaced. Returns the label in the table.
         """
         inputs = self.inputs
-        label = " ".join(label.split())[:60] or controller.name or type(controller).__name__
+        label = " ".join(label.split())[:LONGEST_LABEL] or controller.name or type(controller).__name__
         if label not in inputs.controllers and len(inputs.controllers) >= MAX_STRATEGIES:
             raise InputError(
                 f'strategy "{label}": there are {MAX_STRATEGIES} strategies already; remove one first.'
@@ -457,6 +460,40 @@ class Session:
             controllers=others, visible=inputs.visible - {label}, selected=selected, project=project,
             optima=_without(inputs.optima, label),
         )  # fmt: skip
+
+    def rename(self, label: str, name: str) -> None:
+        """Call an added strategy by another name, at its place in the table.
+
+        >>> session = Session(controllers=["direct"])
+        >>> _ = session.add("mine", make_controller("ramp"))
+        >>> session.rename("mine", "slow ramp")
+        >>> session.inputs.selected, list(session.inputs.controllers)
+        ('slow ramp', ['direct', 'slow ramp'])
+        >>> session.rename("slow ramp", "s-curve")
+        Traceback (most recent call last):
+        softstart.errors.InputError: name = "s-curve": there is a strategy of this name already; ...
+        """
+        self._check_label(label)
+        inputs, name = self.inputs, " ".join(name.split())[:LONGEST_LABEL]
+        if name == label:
+            return
+        if label in self._initial:
+            raise InputError(f'strategy "{label}": it is one of softstart and keeps its name.')
+        if not name or name in (*inputs.controllers, *controller_names()):
+            reason = "there is a strategy of this name already" if name else "the field is empty"
+            raise InputError(f'name = "{name}": {reason}; write another name, as slow ramp.')
+        controller = renamed(inputs.controllers[label], name)
+
+        def by_name(things: Mapping[str, Any]) -> dict[str, Any]:
+            return {name if one == label else one: thing for one, thing in things.items()}
+
+        self._change(
+            controllers=by_name(inputs.controllers) | {name: controller},
+            visible=frozenset(by_name(dict.fromkeys(inputs.visible))),
+            selected=name if inputs.selected == label else inputs.selected,
+            project=inputs.project.renamed(label, name),
+            optima=by_name(inputs.optima),
+        )
 
     def select(self, label: str) -> None:
         """Make a strategy the one with the large figure; it is drawn from then on."""

@@ -245,6 +245,21 @@ class Project(ParameterFile, what="a project"):
             given.pop("strategy", None)
         return type(self)(**given)
 
+    def renamed(self, name: str, new: str) -> Self:
+        """With another name of a strategy or an optimum.
+
+        >>> steady = Project().added("steady", TorqueProfile([0.0], [62.0]))
+        >>> steady.renamed("steady", "slow").strategies[0].name
+        'slow'
+        """
+        return self.replace(
+            **{
+                rows: [one.replace(name=new) if one.name == name else one for one in getattr(self, rows)]
+                for rows in ("strategies", "optima")
+            },
+            **({"strategy": new} if self.strategy == name else {}),
+        )
+
     def contradictions(self) -> Iterator[str]:
         """What is wrong in the files that the project holds, and names that are given twice or to nothing."""
         wrong = Mistakes()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from softstart.controller.base import Controller
 from softstart.controller.finding import controller_of, make_controller, named
-from softstart.controller.tuned import ScheduleFile, read_gains, strategy_text
+from softstart.controller.tuned import ScheduleFile, Tuned, read_gains, strategy_text
 from softstart.drive import Duty, Machine
 from softstart.errors import InputError
 from softstart.input.documents import kind_of_document, parsed
@@ -206,12 +208,28 @@ def strategy_of(text: str, name: str) -> Controller:
             raise InputError(
                 f"{where}: [parameters] file names another file; give the torque profile itself."
             )
-        inner = re.fullmatch(rf"{re.escape(saved.controller)} \((.+)\)", name)
         try:
-            return controller_of(saved, path, inner[1] if inner else name)
+            return controller_of(saved, path, _label_in(name, saved.controller))
         except InputError as error:
             raise InputError([one.replace("controller =", "strategy =") for one in error.sentences]) from None
     return player_of(TorqueProfile.read(text, ".toml" if toml else ".csv", where), name)
+
+
+def renamed(controller: Controller, label: str) -> Controller:
+    """The same own strategy under another name: gains, settings or the player of a profile.
+
+    >>> renamed(player_of(TorqueProfile([0.0], [62.0]), "mine"), "slow").name
+    'slow'
+    """
+    if isinstance(controller, Tuned):
+        return replace(controller, label=_label_in(label, controller.controller.name))
+    return controller if profile_of(controller) is None else named(copy(controller), label)
+
+
+def _label_in(name: str, controller: str) -> str:
+    """The label of gains that are called so in tables: "robust" of "ramp (robust)"."""
+    inner = re.fullmatch(rf"{re.escape(controller)} \((.+)\)", name)
+    return inner[1] if inner else name
 
 
 def profile_of(controller: Controller) -> TorqueProfile | None:

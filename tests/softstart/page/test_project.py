@@ -10,7 +10,9 @@ import pytest
 from softstart import Drive, Duty, InputError, TorqueProfile, optimize, simulate
 from softstart.controller import make_controller
 from softstart.controller.tuned import RobustGains
+from softstart.page.controls import Controls
 from softstart.page.downloads import profile_file
+from softstart.page.frames import FrameBuilder
 from softstart.page.links import inputs_of, link_of
 from softstart.page.project import other_machines, project_of, take_file, take_text, turn_to
 from softstart.page.session import ClaimedOptimum, Session
@@ -33,6 +35,76 @@ def worked_on() -> Session:
     session.set("limits.shaft_torque", "150 N*m")
     take_text(session, Duty.load("travel-crane").to_toml(), "shift")
     return session
+
+
+def test_own_strategies_are_renamed_saved_and_undone() -> None:
+    drive = CRANE.replace(target_speed=60.0)
+    session = Session(drive, controllers=["direct", "ramp"])
+    session.add("profile 1", player_of(PROFILE, "profile 1"))
+    session.add("ramp (robust)", GAINS)
+    best = optimize(drive, 0.2883042)
+    claims = StoredOptimum.of(best, "best", drive.name)
+    session.add("best", claims.controller, optimum=ClaimedOptimum(drive, claims), select=False)
+    session.select("profile 1")
+    session.set_reference()
+    before, known = session.inputs, figures(session)
+    names = {"profile 1": "by hand", "ramp (robust)": "ramp (night)", "best": "lowest"}
+    for one, name in names.items():
+        session.rename(one, name)
+    assert figures(session) == {names.get(one, one): value for one, value in known.items()}
+    assert session.inputs.selected == "by hand"
+    assert session.inputs.visible == {names.get(one, one) for one in before.visible}
+    shown = {one: session.inputs.controllers[one].name for one in ("by hand", "ramp (night)")}
+    assert shown == {"by hand": "by hand", "ramp (night)": "ramp (night)"}
+    project = project_of(session)
+    assert ([one.name for one in project.strategies], [one.name for one in project.optima]) == (
+        ["by hand", "ramp (night)"], ["lowest"],
+    )  # fmt: skip
+    assert project.optima[0].checked(project.single())
+    other = Session(project, controllers=["direct", "ramp"])
+    assert figures(other) == figures(session)
+    other.rename("lowest", "quick")  # of a project that was opened
+    other.rename("by hand", "mine")
+    again = project_of(other)
+    assert ([one.name for one in again.optima], again.strategy) == (["quick"], "mine")
+    assert again.optima[0].checked(again.single())
+    for _ in names:
+        session.undo()
+    assert session.inputs is before
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("direct", 'name = "direct": there is a strategy of this name already; write another name'),
+        ("s-curve", 'name = "s-curve": there is a strategy of this name already'),  # not in this table
+        (" ", 'name = "": the field is empty'),
+    ],
+)
+def test_a_name_that_cannot_be_taken_changes_nothing(name: str, says: str) -> None:
+    session = Session(controllers=["direct", "ramp"])
+    session.add("profile 1", player_of(PROFILE, "profile 1"))
+    before = session.inputs
+    with pytest.raises(InputError, match=says):
+        session.set("strategy.name", name)
+    with pytest.raises(InputError, match='strategy "direct": it is one of softstart and keeps its name'):
+        session.rename("direct", "mine")
+    assert session.inputs is before
+
+
+def test_the_name_is_a_field_of_own_strategies_alone() -> None:
+    session = Session(controllers=["direct", "ramp"])
+    frames = FrameBuilder(session)
+    controls = Controls(session, frames, lambda: None)
+    assert "strategy.name" not in frames.entries
+    session.add("profile 1", player_of(PROFILE, "profile 1"))
+    frame = frames.main_frame()
+    assert frame["fields"]["strategy.name"] == {"text": "profile 1"}
+    controls.take({"what": "edit", "path": "strategy.name", "text": "by hand"})
+    frame = frames.main_frame()
+    assert (frame["selected"], frame["fields"]["strategy.name"]) == ("by hand", {"text": "by hand"})
+    controls.take({"what": "edit", "path": "strategy.name", "text": "direct"})
+    assert "of this name already" in frames.main_frame()["mistakes"]["strategy.name"]
 
 
 def figures(session: Session) -> dict[str, tuple[float, float]]:
