@@ -30,7 +30,7 @@ from typing import IO, Any, Literal, NamedTuple, ParamSpec, Self, TypeVar, cast
 
 from softstart import __version__
 from softstart.errors import InputError, SimulationError
-from softstart.stopping import AT_STOP, STOPPING
+from softstart.stopping import AT_STOP, BEGINNING, STOPPING
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -118,21 +118,22 @@ class Worker:
     """
 
     def __init__(self, modules: Sequence[str] = (), niceness: int = 0, quiet: bool = False) -> None:
-        if STOPPING.is_set():
-            raise DiedError("stopped")
         path = [str(entry) for entry in sys.path]  # the same modules are found as here
         begin = f"import sys; sys.path[:] = {path!r}; from softstart.parallel import _serve; "
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", f"{begin}_serve({list(modules)!r}, {niceness})"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL if quiet else None,
-            env={**os.environ, **ONE_THREAD},
-            start_new_session=True,
-        )
         self._lock = threading.Lock()
+        with BEGINNING:
+            if STOPPING.is_set():
+                raise DiedError("stopped")
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", f"{begin}_serve({list(modules)!r}, {niceness})"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL if quiet else None,
+                env={**os.environ, **ONE_THREAD},
+                start_new_session=True,
+            )
+            AT_STOP.append(self.kill)
         self._messages: SimpleQueue[bytes | None] = SimpleQueue()
-        AT_STOP.append(self.kill)
         threading.Thread(target=_collect, args=(self._process.stdout, self._messages), daemon=True).start()
 
     @property

@@ -150,12 +150,8 @@ class PartStore:
                     made = []
                 else:
                     made = [file, *(folder for folder in file.parents if not folder.exists())]
-                    file.parent.mkdir(parents=True, exist_ok=True)
                 stack.callback(self._close, made)
-                stack.enter_context(at_stop(lambda: self._close(made)))
-                with self._using:
-                    self._base = sqlite3.connect(file, 0.0, isolation_level=None, check_same_thread=False)
-                    self.damaged = self._read(self._base)
+                stack.enter_context(at_stop(lambda: self._close(made), lambda: self._begin(file)))
                 if not self.target.inside:  # a folder reports its own files with them
                     self.target.warn_of_damage(self.damaged)
                 self._open = stack.pop_all()
@@ -163,6 +159,11 @@ class PartStore:
 
     def __exit__(self, *error: object) -> None:
         self._open.close()
+
+    def _begin(self, file: Path) -> None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self._base = sqlite3.connect(file, 0.0, isolation_level=None, check_same_thread=False)
+        self.damaged = self._read(self._base)
 
     def find(self, *part: object) -> PartRecord | None:
         """The record of a part, or None if it is not finished."""
@@ -229,9 +230,10 @@ class PartStore:
             if self._base is not None:
                 self._base.close()
         if made and not self._parts and not self._stays:
-            made[0].unlink(missing_ok=True)
-            with suppress(OSError):
-                for folder in made[1:]:
+            if self._base is not None:
+                made[0].unlink(missing_ok=True)
+            for folder in made[1:]:
+                with suppress(OSError):
                     folder.rmdir()
 
 
@@ -247,12 +249,11 @@ def fresh_folder(home: Path, *also: Path) -> Iterator[Path]:
         if sys.platform != "win32" and not _runs(left.name.removeprefix(prefix).partition("-")[0]):
             shutil.rmtree(left, ignore_errors=True)
     path = home / f"{prefix}{os.getpid()}-{secrets.token_hex(4)}.part"
-    path.mkdir()
-    try:
-        with at_stop(lambda: _remove(path)):
+    with at_stop(lambda: _remove(path), path.mkdir):
+        try:
             yield path
-    finally:
-        _remove(path)
+        finally:
+            _remove(path)
 
 
 def _runs(number: str) -> bool:

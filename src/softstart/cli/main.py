@@ -35,11 +35,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _main(list(arguments))
     sys.excepthook = _internal_error
     _open_closed_streams()
-    watcher = _stop_on_signals()
     for stream in (sys.stdout, sys.stderr):  # a question mark for what the terminal's encoding lacks
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     with at_stop(partial(_fail, [STOP], INTERRUPTED)):
+        watcher = _stop_on_signals()
         code = _main(sys.argv[1:])
         if STOPPING.is_set():
             watcher.join()  # until the process is ended

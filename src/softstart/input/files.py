@@ -170,18 +170,18 @@ def write_whole(path: Path, write: Callable[[IO[Any]], object], binary: bool = F
     """
     refused = f"output = {path}: the file cannot be written there"
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    # a new file with the rights that the system gives to one: asking for the umask would set it for a moment,
+    # in all threads
+    create = partial(temporary.open, "xb" if binary else "x", encoding=None if binary else "utf-8")
+    remedy = "give a folder that exists and that you may write to"
     try:
-        # a new file with the rights that the system gives to one: asking for the umask would set it for
-        # a moment, in all threads
-        opened = temporary.open("xb" if binary else "x", encoding=None if binary else "utf-8")
+        with at_stop(partial(temporary.unlink, missing_ok=True), create) as opened:
+            remedy = "nothing was left behind"
+            try:
+                with opened as stream:
+                    write(stream)
+                temporary.replace(path)
+            finally:
+                temporary.unlink(missing_ok=True)
     except OSError as error:
-        remedy = "give a folder that exists and that you may write to"
         raise InputError(f"{refused}: {error.strerror or error}; {remedy}.") from None
-    try:
-        with at_stop(partial(temporary.unlink, missing_ok=True)), opened as stream:
-            write(stream)
-        temporary.replace(path)
-    except OSError as error:
-        raise InputError(f"{refused}: {error.strerror or error}; nothing was left behind.") from None
-    finally:
-        temporary.unlink(missing_ok=True)
