@@ -38,11 +38,14 @@ def test_each_machine_has_the_figures_of_its_own_comparison() -> None:
 
 
 def test_after_wear_strategies_stay_set_up_for_the_new_machine() -> None:
-    both = side_by_side(CRANE, None, NAMES, worn_gap="2 rad")
+    """The time from contact to the peak of stage 2, [G](14), follows from the gap: K_dyn tells which gap."""
+    both = side_by_side(CRANE, None, [*NAMES, "reduced-two-stage"], worn_gap="2 rad")
     assert both.second.drive.gap == 2.0
     for new, worn in both.pairs:
         assert new.run.k_dyn == simulate(CRANE, new.name).k_dyn
         assert worn.run.k_dyn == simulate(CRANE.with_gap(2.0), new.name, fitted_to=CRANE).k_dyn
+    k_dyn = {worn.name: worn.run.k_dyn for _, worn in both.pairs}
+    assert k_dyn["reduced-two-stage"] > simulate(CRANE.with_gap(2.0), "reduced-two-stage").k_dyn + 0.01
 
 
 def test_the_figure_shows_both() -> None:
