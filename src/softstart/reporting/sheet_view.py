@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from softstart.controller.tuned import GainSchedule
 from softstart.errors import listed
@@ -38,7 +39,13 @@ def shown_sheet(sheet: ParameterSheet) -> Sheet:
     lines = [title, *machine_lines(sheet.drive)[1:]]
     lines.insert(1, f"  for    {sheet.drive.name}")
     tables = [settings(sheet), at_each_inverter(sheet), starts(sheet), cells(sheet)]
-    return Sheet(title, lines, tables=tables, conclusions=[outcome(sheet)], notes=notes(sheet, code=True))
+    return Sheet(
+        title,
+        lines,
+        tables=tables,
+        conclusions=[outcome(sheet)],
+        notes=[*notes(sheet), *common_notes([sheet])],
+    )
 
 
 def settings(sheet: ParameterSheet) -> TextTable:
@@ -142,8 +149,43 @@ def outcome(sheet: ParameterSheet) -> str:
     )
 
 
-def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
-    """What else is to be known of the values; with `code` where the program of the strategy is from."""
+def common_notes(sheets: Sequence[ParameterSheet]) -> list[str]:
+    """What holds for several sheets beside one another, said once; of which ones, if it is not all of them.
+
+    >>> from softstart import parameter_sheet
+    >>> pair = [parameter_sheet("crane-4amtkf", name) for name in ("ramp", "take-up")]
+    >>> [note[:46] for note in common_notes(pair)][:2]
+    ['ramp: Half a step off: all combinations of hal', 'take-up: Half a step off: each value alone, an']
+    """
+    found, every = list[str](), [one.name for one in sheets]
+    for notes_of_one_kind in zip(*map(_general, sheets), strict=True):
+        for note in filter(None, dict.fromkeys(notes_of_one_kind)):
+            pairs = list(zip(every, notes_of_one_kind, strict=True))
+            names, others = ([name for name, one in pairs if (one == note) == so] for so in (True, False))
+            of = f"All but {listed(others)}: " if len(others) < len(names) else f"{listed(names)}: "
+            found.append(f"{of if others else ''}{note}")
+    return found
+
+
+def _general(sheet: ParameterSheet) -> tuple[str, str, str]:
+    """What is to be known of most sheets alike: half steps, per cent and program; "" for none."""
+    rated, basis = rated_torque(sheet.drive.design_drive)
+    every = "all combinations of" if sheet.corners else "each value alone, and all together,"
+    current = " A limit of the torque-producing current: the same percentages as of the torque."
+    base = f"100 % of torque is the {basis} of {torque_in_words(rated, units_of(sheet.drive))}."
+    program = (
+        "softstart exports the strategy with the values of its sheet as a program for a PLC, an inverter or "
+        "a simulator (Structured Text, C, FMU), with a test by real starts."
+    )
+    return (
+        f"Half a step off: {every} half a step down or up." if sheet.variants else "",
+        base + current if basis == RATED else base,
+        "" if sheet.computes_with is None else program,
+    )
+
+
+def notes(sheet: ParameterSheet) -> list[str]:
+    """What else is to be known of the values of this sheet."""
     drive, units = sheet.drive.design_drive, units_of(sheet.drive)
     (rated, basis), found = rated_torque(drive), [sheet.loop]
     if sheet.margins and sheet.rounded:
@@ -156,15 +198,9 @@ def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
         names = listed([one.replace("_", " ") for one in sheet.moved])
         found.append(f"Not at the nearest step, which would break the rule of the recommendation: {names}.")
     if sheet.variants:
-        every = "all combinations of" if sheet.corners else "each value alone, and all together,"
-        found.append(f"Half a step off: {sheet.variants} starts, {every} half a step down or up.")
         found += _half_a_step_off(sheet)
     limits = listed(sheet.torque_limits(drive, units))
-    current = " A limit of the torque-producing current: the same percentages." if basis == RATED else ""
-    found.append(
-        f"100 % of torque is the {basis} of {torque_in_words(rated, units)}. Torque limits of the "
-        f"inverter, not tighter than what this start takes: {limits}.{current}"
-    )
+    found.append(f"Torque limits of the inverter, not tighter than what this start takes: {limits}.")
     if coarse := [one.name.replace("_", " ") for one in sheet.settings if one.coarse]:
         found.append(f"The steps are coarse against {', '.join(coarse)}: look for a finer setting.")
     found += _ramps(sheet, rated, basis)
@@ -174,11 +210,6 @@ def notes(sheet: ParameterSheet, code: bool = False) -> list[str]:
             tuned = " that its gains were tuned for" if sheet.own != drive else ""
             also = f"; beside the sheet it computes with {listed(sheet.computes_with)} of the drive{tuned}"
         found.append(f"The law is code{also}.")
-    if sheet.computes_with is not None:
-        found.append(
-            "softstart exports this strategy with these values as a program for a PLC, an inverter or a "
-            "simulator (Structured Text, C, FMU), with a test by real starts."
-        )
     return [one for one in found if one]
 
 
@@ -188,12 +219,12 @@ def _half_a_step_off(sheet: ParameterSheet) -> list[str]:
     if permitted is not None and sheet.worst_peak > permitted:
         peak, of = column_of([float(units.shown(sheet.worst_peak, "N*m"))])[0], units.label("N*m")
         found.append(
-            f"Half a step off the {'output' if units.gear else 'shaft'} torque may reach {peak} {of}, more "
+            f"Half a step off, the {'output' if units.gear else 'shaft'} torque may reach {peak} {of}, more "
             f"than the {seen(float(permitted), 'N*m', units)} that are permitted: set these values exactly, "
             "or finer ones."
         )
     if math.isnan(sheet.worst_k_dyn):
-        found.append("In at least one of them the load does not reach its target speed: set finer steps.")
+        found.append("Half a step off, the load may not reach its target speed: set finer steps.")
     return found
 
 

@@ -17,7 +17,7 @@ from softstart.export.design import design_for
 from softstart.plugins import controller_names
 from softstart.reporting import Resolution, report
 from softstart.reporting.sheet import make_sheet
-from softstart.reporting.sheet_view import settings
+from softstart.reporting.sheet_view import common_notes, notes, settings
 from softstart.start.resolution import nearest_step, rated_torque
 
 HOIST = Drive.load("hoist-15kw")
@@ -46,6 +46,31 @@ def test_rounded_values_are_multiples_and_their_figures_those_of_simulate(name):
     assert sheet.rounded.start_time == again.start_time
     assert sheet.exact.k_dyn == simulate(drive, name).k_dyn
     assert {one.name for one in sheet.settings if one.step is None} <= {"period", "shaper", "raise_at"}
+
+
+def test_what_holds_for_several_sheets_is_said_once():
+    names = ["ramp", "shaped", "take-up"]
+    found = report("crane-4amtkf", controllers=names, budget=0.0)
+    several = list(found.sheets)
+    assert len(several) == 2
+    several.append(parameter_sheet("crane-4amtkf", "take-up"))  # of more values than all combinations
+    own = [one for sheet in several for one in notes(sheet)]
+    common = common_notes(several)
+    assert [sum(words in one for one in own + common) for words in ("100 % of torque is", "FMU")] == [1, 1]
+    assert sorted(one.partition(":")[0] for one in common if "half a step" in one) == [
+        "All but take-up",
+        "take-up",
+    ]
+    # each sheet alone says all of it
+    for sheet in several:
+        alone = sheet.sheet.notes
+        assert alone[: len(notes(sheet))] == notes(sheet)
+        assert any("100 % of torque is the rated torque" in one for one in alone)
+        assert any("Torque limits of the inverter" in one for one in alone)
+    page = re.sub(r"\s+", " ", found.to_html())
+    assert page.count("100 % of torque is the rated torque") == 1
+    assert page.count("(Structured Text, C, FMU)") == 1
+    assert page.count("Torque limits of the inverter, not tighter") == 2
 
 
 def test_worst_case_is_the_worst_of_all_half_steps():
