@@ -31,7 +31,7 @@ from softstart.cli.main import main
 from softstart.input.gear import NO_GEAR, NO_OUTPUT, Gear
 from softstart.quantities import RefusedError
 from softstart.reporting.document import data_of, strategies
-from softstart.reporting.sheet_view import notes, settings, starts
+from softstart.reporting.sheet_view import common_notes, notes, settings, starts
 from softstart.views.fatigue import fatigue_tables
 from softstart.views.identification import plan_table
 from softstart.views.numbers import TextTable, seen_at, units_of
@@ -207,7 +207,7 @@ def test_a_sheet_sets_the_motor_and_says_what_that_is_at_the_output(gear: Gear, 
           [found.exact.peak_torque, found.rounded.peak_torque, found.worst_peak])  # fmt: skip
     said = re.search(
         r"of (\S+) (\w+ \w+) at the output, (\S+) .* takes: (\S+) \w+ \w+ at the output \((\S+) %",
-        " ".join(notes(found)),
+        " ".join([*common_notes([found]), *notes(found)]),
     )
     number, unit, motor, limit, percent = said.groups()
     rated = float(drive.rated)
