@@ -242,6 +242,16 @@ class Duty(ParameterFile, library=library):
         duty = OfMachine.from_toml(text, where=where, also=also)
         return cls(duty.steps, shift=duty.shift)
 
+    def through(self, gear: Gear) -> Self:
+        """The same with the values of its steps that were given "at output" brought through this gear.
+
+        >>> given_at_motor = Duty([DutyStep("load", torque=2.0), DutyStep("start")])
+        >>> given_at_motor.through(Gear(20.0)) == given_at_motor
+        True
+        """
+        each = gear._replace(load=None)  # a step has a load of its own
+        return self.replace(steps=[step.through(each) for step in self.steps])
+
     @classmethod
     def _from_document(
         cls, document: dict[str, Any], where: str, also: Mapping[str, object] | None = None

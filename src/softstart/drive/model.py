@@ -106,6 +106,7 @@ class Drive(ParameterFile, Machine, library=library):
     """
 
     KIND: ClassVar[str] = "drive"
+    GEARED: ClassVar[frozenset[str]] = frozenset(("gear_ratio", "gear_efficiency"))
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
     # as a chain has it
     motor_index, load_index = 0, 1
@@ -343,8 +344,10 @@ class Drive(ParameterFile, Machine, library=library):
 
     def _changed(self, changes: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake]) -> Self:
         """As any parameters; a stiffness that is set is known, and has no soft end."""
-        known = {"soft_stiffness": None} if "stiffness" in changes else {}
-        return super()._changed({**known, **changes}, wording, mistakes)
+        also: dict[str, object] = {"soft_stiffness": None} if "stiffness" in changes else {}
+        if self.duty is not None and isinstance(gear := self._new_gear(changes), Gear):
+            also["duty"] = self.duty.through(gear)
+        return super()._changed(also | dict(changes), wording, mistakes)
 
     @cached_property
     def soft(self) -> Self | None:

@@ -84,6 +84,16 @@ class Gear(NamedTuple):
         return self.to_output(1.0, "N*m")
 
 
+def behind(value: object) -> bool:
+    """Whether "at output" stands behind a value, or behind one of a list.
+
+    >>> behind("9 arcmin at output"), behind(["80 N*m at output"]), behind(0.5)
+    (True, True, False)
+    """
+    each = value if isinstance(value, list | tuple) else [value]
+    return any(isinstance(one, str) and BEHIND.fullmatch(one) for one in each)
+
+
 def alike(values: Sequence[object]) -> None:
     """Raise `RefusedError` where "at output" stands behind some values of a list alone.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NoReturn, Self, TypeVar, dataclass_transform
 
@@ -20,7 +21,7 @@ import numpy.typing as npt
 from softstart.errors import InputError
 from softstart.hints import term
 from softstart.input.documents import DocumentTable
-from softstart.input.gear import NO_GEAR, Gear
+from softstart.input.gear import NO_GEAR, Gear, behind
 from softstart.input.parameters import (
     REQUIRED,
     Limit,
@@ -28,11 +29,12 @@ from softstart.input.parameters import (
     Parameter,
     Wording,
     meant_by,
+    read_value,
     read_values,
     sentences_of,
     without_unit,
 )
-from softstart.quantities import show
+from softstart.quantities import RefusedError, show
 
 if TYPE_CHECKING:
     Read_co = TypeVar("Read_co", covariant=True)
@@ -178,12 +180,14 @@ class ParameterSet:
     it in sentences, as "a drive", and `SEVERAL` says what to do with several values for one. With `BATCH` its
     numbers may be arrays, which are read-only. Bare numbers of parameters in `USUAL` are refused in a file,
     see `without_unit`. The fields of a subclass with `kw_only=False` are positional arguments as well.
+    Values given "at output" are read again when one of those in `GEARED` is changed, as a ratio.
     """
 
     WHAT: ClassVar[str] = "a table"
     SEVERAL: ClassVar[str] = ""
     BATCH: ClassVar[bool] = False
     USUAL: ClassVar[Mapping[str, str]] = {}
+    GEARED: ClassVar[frozenset[str]] = frozenset()
     PARAMETERS: ClassVar[Mapping[str, Parameter]] = {}
     PARTS: ClassVar[Mapping[str, Component]] = {}
     FIELDS: ClassVar[Mapping[str, Component | Parameter]] = {}
@@ -266,6 +270,9 @@ class ParameterSet:
             )
         fields = vars(self)
         fields.update(values)
+        fields["_at_output"] = {
+            name: given[name] for name in given.keys() & parameters if behind(given[name])
+        }
         fields["_given"] = frozenset(
             name
             for name in given.keys() & names.keys()
@@ -301,6 +308,7 @@ class ParameterSet:
         """Set values that follow from others, as if they had been given; None takes one back."""
         fields = vars(self)
         fields.update(values)
+        fields["_at_output"] = {p: text for p, text in fields["_at_output"].items() if p not in values}
         fields["_given"] = frozenset(
             one for one in fields["_given"] | values.keys() if fields[one] is not None
         )
@@ -325,9 +333,35 @@ class ParameterSet:
         return self._changed(changes, Wording(), [])
 
     def _changed(self, changes: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake]) -> Self:
-        given = self.given()
-        known = {name: value for name, value in given.items() if name not in changes}
-        return self._made(given | dict(changes), wording, mistakes, known)
+        known, written = self.given(), vars(self)["_at_output"]
+        given = known | written | dict(changes)
+        again = written if isinstance(self._new_gear(changes), Gear) else {}
+        known = {name: value for name, value in known.items() if name not in changes and name not in again}
+        return self._made(given, wording, mistakes, known)
+
+    def _new_gear(self, changes: Mapping[str, object]) -> Gear | str:
+        """The gear after these changes, for values "at output"; "" if it is the same, or wrong."""
+        changed = {name: changes[name] for name in self.GEARED & changes.keys()}
+        with suppress(RefusedError):
+            for name, value in changed.items():
+                if value is not None:
+                    read_value(self.PARAMETERS[name], value, batch=self.BATCH)
+            written = vars(self)["_at_output"]
+            return self._gear_in(self.given() | written | dict(changes)) if changed else ""
+        return ""
+
+    def through(self, gear: Gear) -> Self:
+        """The same with the values given "at output" brought to the motor shaft through this gear.
+
+        >>> from softstart import Drive
+        >>> Drive.load("crane-4amtkf").replace(gear_ratio=2, gap="0.1 rad at output").through(Gear(20.0)).gap
+        2.0
+        """
+        given, written = self.given(), vars(self)["_at_output"]
+        again, wrong = read_values(
+            written, {name: self.PARAMETERS[name] for name in written}, Wording(), gear=gear
+        )
+        return self._made(given | written, Wording(), wrong, given | again) if written else self
 
     def __eq__(self, other: object) -> bool:
         return self._content() == other._content() if type(other) is type(self) else NotImplemented

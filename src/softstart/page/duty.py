@@ -12,6 +12,7 @@ from softstart.drive.duty import KEYS, Do, Duty, DutyStep, Shift
 from softstart.drive.machine import Machine
 from softstart.errors import InputError
 from softstart.hints import nearest
+from softstart.input.gear import Gear
 from softstart.page.machines import FormField, rounded
 
 PATH = "duty"  # before the paths of all its fields: duty[2].time, duty.stop, duty.shift.hours
@@ -84,6 +85,12 @@ class DutyPlan:
         steps = list(self.steps)
         steps.insert(min(max(to, 0), len(steps)), steps.pop(index))
         return replace(self, steps=tuple(steps))
+
+    def through(self, gear: Gear | None) -> DutyPlan:
+        """With the values that were given "at output" brought there through this gear, if there is one."""
+        if gear is None:
+            return self
+        return replace(self, steps=tuple(step.through(gear._replace(load=None)) for step in self.steps))
 
     def timed(self, index: int, seconds: float) -> DutyPlan:
         """With another time of a step, as it is set by hand."""

@@ -294,7 +294,10 @@ class Session:
         settings = {
             path: value if isinstance(value, str) else repr(float(value)) for path, value in changes.items()
         }
-        self._change(gesture, machine=startable(with_typed_changes(self.inputs.machine, settings)))
+        machine, duty = startable(with_typed_changes(self.inputs.machine, settings)), self.inputs.duty
+        if duty is not None and any(path.startswith("gear") for path in settings):
+            duty = duty.through(machine.gear)
+        self._change(gesture, machine=machine, duty=duty)
         if texts := {path: text for path, text in changes.items() if isinstance(text, str)}:
             values = self.inputs.machine.parameters_by_path()
             self.typed |= {(path, values[path][1]): text for path, text in texts.items() if path in values}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import sys
 
 import pytest
@@ -134,6 +135,19 @@ def test_a_setting_is_told_at_both_shafts(as_json):
     table = as_json("compare", "crane-4amtkf", "--controllers", "direct", *settings, *there)
     (limit,) = table["strategies"][0]["limits"]
     assert limit["permitted"] == pytest.approx(5000 / (38.1 * 0.95), rel=1e-15)
+
+
+def test_another_ratio_is_as_if_it_stood_in_the_file(place, as_json):
+    text = Drive.load("crane-4amtkf").replace(gear_ratio=38.1, target_speed=60.0).to_toml()
+    text = re.sub("(?m)^gap = .*", 'gap = "45 arcmin at output"', text)
+    text = re.sub("(?m)^stiffness = .*", 'stiffness = "500 kN*m/rad at output"', text)
+    (place / "old.toml").write_text(text)
+    (place / "new.toml").write_text(text.replace("ratio = 38.1", "ratio = 20"))
+    for words in (["simulate", "--controller", "ramp"], ["compare", "--controllers", "ramp"]):
+        command, *more = words
+        new = as_json(command, "new.toml", *more)
+        assert as_json(command, "old.toml", *more, "--set", "gear.ratio=20") == new
+        assert as_json(command, "old.toml", *more) != new
 
 
 @pytest.mark.parametrize(

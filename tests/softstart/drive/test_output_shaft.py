@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -17,6 +18,7 @@ from softstart.controller.recipe import Recipe
 from softstart.drive import PARAMETERS
 from softstart.drive.model import BY_PATH
 from softstart.drive.plausibility import plausibility_warnings
+from softstart.page.session import Session
 from softstart.project import Project
 from softstart.reporting.document import data_of
 from softstart.start.recommendation import Row
@@ -353,3 +355,102 @@ def test_optimum_and_comparison_keep_a_limit_at_the_output() -> None:
         for one in (limited, drive.replace(permissible_torque=175.0))
     ]
     assert both[0].text.replace("output torque", "shaft torque").split(".")[0] == both[1].text.split(".")[0]
+
+
+AT_OUTPUT = """
+units = "rpm, deg"
+[motor]
+inertia = 0.035
+starting_torque = "62 N*m"
+rated_speed = "880 rpm"
+minimum_torque = "-60 N*m"
+[gear]
+ratio = 38.1
+efficiency = 0.95
+[shaft]
+stiffness = "35 kN*m/rad at output"
+damping = 0.02
+gap = "9 arcmin at output"
+[load]
+inertia = "20 kg*m^2 at output"
+torque = "80 N*m at output"
+friction = 0.5
+[start]
+target_speed = "20 rpm at output"
+[limits]
+shaft_torque = "900 N*m at output"
+output_torque = "950 N*m"
+starts_per_hour = 60
+life = "20000 h"
+[limits.fatigue]
+slope = 6.6
+torque = "700 N*m at output"
+cycles = 5e6
+[[duty]]
+do = "start"
+[[duty]]
+do = "hold"
+time = 3
+[[duty]]
+do = "stop"
+by = "torque"
+[[duty]]
+do = "load"
+torque = "-40 N*m at output"
+"""
+NEW_GEARS = [{"ratio": "20.0"}, {"efficiency": "0.8"}, {"ratio": "45.5", "efficiency": "0.7"}]
+
+
+def with_gear(text: str, new: dict[str, str]) -> str:
+    old = {"ratio": "38.1", "efficiency": "0.95"}
+    for key, value in new.items():
+        text = text.replace(f"{key} = {old[key]}", f"{key} = {value}")
+    return text
+
+
+@pytest.mark.parametrize("new", NEW_GEARS)
+@pytest.mark.parametrize("load", ["80 N*m", "-80 N*m"])
+def test_another_gear_reads_what_the_file_has_at_the_output(new: dict[str, str], load: str) -> None:
+    text = AT_OUTPUT.replace("80 N*m", load)
+    drive, written = Drive.from_toml(text), Drive.from_toml(with_gear(text, new))
+    settings_of_new = [f"gear.{key}={value}" for key, value in new.items()]
+    by_name = {f"gear_{key}": float(value) for key, value in new.items()}
+    assert written != drive
+    assert drive.with_settings(settings_of_new) == written
+    assert drive.replace(**by_name) == written
+    assert pickle.loads(pickle.dumps(drive)).replace(**by_name) == written
+    page = Session(drive)
+    page.set_all({f"gear.{key}": value for key, value in new.items()})
+    assert page.inputs.machine_with_duty == written
+    # what is set as well counts as it is set, before, with or after the gear
+    changed = written.replace(gap=0.1)
+    assert drive.with_settings([*settings_of_new, "shaft.gap=0.1"]) == changed
+    assert drive.replace(gap=0.1).with_settings(settings_of_new) == changed
+    assert drive.with_settings(settings_of_new).replace(gap=0.1) == changed
+    again = drive.with_settings([*settings_of_new, "shaft.gap=4 arcmin at output"])
+    assert again == Drive.from_toml(with_gear(text, new).replace("9 arcmin", "4 arcmin"))
+    # and there and back
+    assert drive.replace(**by_name).replace(gear_ratio=38.1, gear_efficiency=0.95) == drive
+
+
+def test_a_table_of_gears_is_read_as_its_files() -> None:
+    text = AT_OUTPUT.partition("[limits.fatigue]")[0]
+    ratios = [20.0, 38.1, 60.0]
+    table = machine_table(Drive.from_toml(text), gear_ratio=ratios)
+    written = [Drive.from_toml(with_gear(text, {"ratio": repr(ratio)})) for ratio in ratios]
+    assert [one.values() for one in table.elements()] == [one.values() for one in written]
+    alone = [simulate(one, "ramp").k_dyn for one in written]
+    assert simulate(table, "ramp").k_dyn.values.tolist() == pytest.approx(alone, rel=1e-12)
+    with pytest.raises(InputError, match="one list cannot follow several gears; write it at the motor shaft"):
+        machine_table(Drive.from_toml(AT_OUTPUT.partition("[[duty]]")[0]), gear_ratio=ratios)
+
+
+def test_without_a_gear_values_stay_until_there_is_one_again() -> None:
+    text = AT_OUTPUT.replace('output_torque = "950 N*m"\n', "").replace("efficiency = 0.95\n", "")
+    drive = Drive.from_toml(text)
+    bare = drive.replace(gear_ratio=None)
+    assert (bare.gap, bare.gear) == (drive.gap, None)
+    assert bare.replace(gear_ratio=20.0) == Drive.from_toml(text.replace("ratio = 38.1", "ratio = 20.0"))
+    with pytest.raises(InputError) as refused:
+        drive.with_settings(["gear.ratio=many"])
+    assert [one.partition(":")[0] for one in refused.value.sentences] == ['gear.ratio = "many"']
