@@ -115,6 +115,22 @@ def test_a_part_of_another_computation_is_no_part(path):
         assert found_in(path) == [None, *PARTS[1:], None]
 
 
+def test_a_damaged_part_is_told_once(path):
+    """Also one under another key, which the part that is computed again does not replace."""
+    with closing(sqlite3.connect(path, isolation_level=None)) as base:
+        base.execute("UPDATE parts SET key = '[9, 0]' WHERE key = '[1, 0]'")
+    with pytest.warns(DamagedWarning, match=r"part \[9, 0\] is damaged"):
+        assert found_in(path) == [None, *PARTS[1:], None]
+    assert found_in(path) == [None, *PARTS[1:], None]
+
+
+@pytest.mark.parametrize("stays", [True, False])
+def test_a_file_without_parts_stays_only_if_others_belong_to_it(tmp_path, stays):
+    with records(tmp_path / "parts") as kept:
+        kept.stay(stays)
+    assert (tmp_path / "parts").exists() == stays
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a limit on the size of files")
 def test_a_full_disk_is_one_sentence_and_costs_no_part(path, tmp_path):
     code = (
@@ -188,6 +204,29 @@ def test_one_writer_at_a_time_and_a_dead_one_locks_nobody_out(tmp_path):
     with fresh_folder(tmp_path) as mine:
         assert {one.name for one in tmp_path.iterdir()} == {"parts.sqlite", mine.name}
     assert [one.name for one in tmp_path.iterdir()] == ["parts.sqlite"]
+
+
+def test_a_file_is_locked_before_anything_is_added(path):
+    again = pytest.raises(InputError, match="another process is writing this tuning")
+    with records(path), again, records(path):
+        pass
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there a folder is not removed by another process")
+def test_folders_of_another_user_and_another_computer_stay(tmp_path, monkeypatch):
+    with fresh_folder(tmp_path) as theirs:
+        pass
+    theirs.mkdir()
+    elsewhere = tmp_path / ".softstart-elsewhere-1-0123abcd.part"
+    elsewhere.mkdir()
+
+    def forbidden(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "kill", forbidden)
+    with fresh_folder(tmp_path):
+        assert theirs.is_dir()
+        assert elsewhere.is_dir()
 
 
 def test_folders_made_at_once_are_not_taken_from_one_another(tmp_path):
