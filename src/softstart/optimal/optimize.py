@@ -71,9 +71,9 @@ def optimize(
 
     Where the closed form (pulse, coast, hold) holds it is the optimum. Else successive linear programs on the
     exact start lead to a local optimum, from the closed form of each start, the gentlest of a few hundred
-    pulses, and the strategies. The figures are those of the exact machine running the profile; the bound says
-    how much better any other start could be. One torque serves all `scenarios`, and all start positions of a
-    machine whose position is unknown: the largest K_dyn counts.
+    pulses, and starts known at other times. The figures are those of the exact machine running the profile;
+    the bound says how much better any other start could be. One torque serves all `scenarios`, and all start
+    positions of a machine whose position is unknown: the largest K_dyn counts.
 
     Parameters
     ----------
