@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.collections import QuadMesh
     from matplotlib.colors import Normalize
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
     from matplotlib.ticker import Locator
 
     from softstart.start.run import Run
@@ -55,6 +56,7 @@ PICTURE_ENDINGS = ("svg", "png")  # of each figure that is saved
 
 LONGEST_NAME = 32  # characters in a figure
 LETTERS = 11.0  # of a title, in an inch
+NARROW, FLATTER = 4.4, 0.7  # inches, and share of the height, of a figure in a column of a page
 
 # what a page does not need: ids that nothing refers to would be in it twice, a <style> would hold for all
 UNUSED = (
@@ -128,6 +130,49 @@ def svg_of(figure: Figure, key: str = "softstart", title: str = "") -> str:
     text = re.sub(UNUSED, "", stream.getvalue(), flags=re.DOTALL).strip()
     label = f' role="img" aria-label="{html.escape(title)}"' if title else ""
     return text.replace("<svg ", f'<svg class="plot"{label} ', 1)
+
+
+def narrowed(figure: Figure) -> Figure:
+    """The figure for a column of a page, where text of the full width is too small to read.
+
+    It is narrower with text of the same size, and legends have rows of their own. One whose panels are side
+    by side has no room there and stays as it is.
+    """
+    specs = [spec for axes in figure.axes if (spec := axes.get_subplotspec()) is not None]
+    legends = [(axes, legend) for axes in figure.axes if (legend := axes.get_legend()) is not None]
+    beside = [axes for axes, legend in legends if _anchor(axes, legend)[0] >= 1.0 > _anchor(axes, legend)[1]]
+    alone = len({spec.colspan.start for spec in specs}) == 1 and not (beside and len(specs) > 1)
+    if not alone or figure.get_figwidth() <= NARROW:
+        return figure
+    figure.set_size_inches(NARROW, FLATTER * figure.get_figheight())
+    if title := figure.get_suptitle():
+        entitle(figure, " ".join(title.split()))
+    letters = int(NARROW * LETTERS) - 4  # beside the scale
+    for axes in figure.axes:
+        axes.set_title(fill(axes.get_title("left"), letters), loc="left", fontsize=SMALL)
+        axes.set_xlabel(fill(axes.get_xlabel(), letters))
+    with drawing():
+        for axes, legend in legends:
+            labels = [text.get_text() for text in legend.get_texts()]
+            handles = [one for one in legend.legend_handles if one is not None]
+            if axes in beside:
+                legend.remove()
+                figure.legend(
+                    handles=handles, labels=labels, loc="outside lower center", ncols=2, fontsize=8.5
+                )
+                figure.set_figheight(figure.get_figheight() + 0.2 * len(labels) / 2)
+            elif _anchor(axes, legend)[1] >= 1.0:
+                columns = min(len(labels), 3)
+                legend_above(axes, columns, columnspacing=1.0, handlelength=1.5, fontsize=8.5)
+                title = axes.get_title("left")
+                axes.set_title(title, loc="left", fontsize=SMALL, pad=6 + 14 * -(-len(labels) // columns))
+    return figure
+
+
+def _anchor(axes: Axes, legend: Legend) -> tuple[float, float]:
+    """Where a legend hangs, in shares of its panel: right of it, or above."""
+    x, y = axes.transAxes.inverted().transform(legend.get_bbox_to_anchor().min)
+    return round(float(x), 6), round(float(y), 6)
 
 
 def entitle(figure: Figure, text: str) -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from softstart import __version__
 from softstart.drive import Machine
-from softstart.views.drawing import save_figure, svg_of
+from softstart.views.drawing import narrowed, save_figure, svg_of
 from softstart.views.drives import controllers_set_up
 from softstart.views.markdown import markdown, write_table, write_text
 from softstart.views.numbers import Column, TextTable, printed, titled, units_for, units_of
@@ -238,8 +238,8 @@ def _parameters(machine: Machine) -> TextTable:
 def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float = math.inf) -> str:
     """A sheet in a notebook or on a page: what came out, facts, tables, the first figures, notes.
 
-    `first`: figures before the tables, where the picture is what was asked for. `width`: pixels for a table;
-    what has no room beside its first columns goes on below.
+    `first`: figures before the tables, where the picture is what was asked for. `width`: pixels for figures
+    and tables; what of these has no room beside its first columns goes on below.
     """
     facts = [TextTable("", [Column("", False), Column("")], sheet.facts)] if sheet.facts else []
     parts = [f"<p><b>{html.escape(sheet.title)}</b></p>"]
@@ -251,7 +251,7 @@ def as_html(sheet: Sheet, figures: int = 1, *, first: bool = False, width: float
     ]  # fmt: skip
     pictures = [
         f'<figure tabindex="0" role="img" aria-label="{html.escape(f"{sheet.title}: {stem}")}">'
-        f"{svg_of(draw(), stem)}</figure>"
+        f"{svg_of(draw() if math.isinf(width) else narrowed(draw()), stem)}</figure>"
         for stem, draw in tuple(sheet.figures.items())[:figures]
     ]
     parts += [*pictures, *tables] if first else [*tables, *pictures]
