@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import socket
 import sqlite3
 import subprocess
 import sys
@@ -17,6 +18,7 @@ import pytest
 from softstart.errors import DamagedWarning, InputError
 from softstart.stopping import AT_STOP
 from softstart.store import PartStore, Target, fresh_folder
+from softstart.views.markdown import output_folder
 
 INPUTS = {"drive": "crane", "seed": 0, "metric": "k_dyn"}
 PARTS = [{"cell": k, "restart": 0, "cost": 0.1 * k, "place": [1.0 / k, None]} for k in (1, 2, 3)]
@@ -56,8 +58,9 @@ def test_other_inputs_are_named_and_their_file_left_alone(path):
     refused(path, "contains a tuning with another drive, seed and more; choose another file", **others)
 
 
-@pytest.mark.parametrize("content", [b"\xff\xfe\n", b"letter" * 999, "database"])
+@pytest.mark.parametrize("content", [b"x", b"\xff\xfe\n", b"letter" * 999, "database"])
 def test_a_file_that_holds_something_else_is_refused(tmp_path, content):
+    """SQLite takes a file of one byte for an empty one."""
     path = tmp_path / "notes"
     if content == "database":
         with closing(sqlite3.connect(path)) as base:
@@ -122,6 +125,15 @@ def test_a_damaged_part_is_told_once(path):
     with pytest.warns(DamagedWarning, match=r"part \[9, 0\] is damaged"):
         assert found_in(path) == [None, *PARTS[1:], None]
     assert found_in(path) == [None, *PARTS[1:], None]
+
+
+@pytest.mark.parametrize(
+    ("count", "sentence"),
+    [(1, "a is damaged"), (4, "a, b, c and d are damaged"), (5, "a, b, c and 2 more are damaged")],
+)
+def test_of_many_damaged_parts_some_are_named(tmp_path, count, sentence):
+    with pytest.warns(DamagedWarning, match=f"kept: {sentence} "):
+        Target("save_to", tmp_path / "kept", "tuning").warn_of_damage("abcde"[:count])
 
 
 @pytest.mark.parametrize("stays", [True, False])
@@ -227,6 +239,19 @@ def test_folders_of_another_user_and_another_computer_stay(tmp_path, monkeypatch
     with fresh_folder(tmp_path):
         assert theirs.is_dir()
         assert elsewhere.is_dir()
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_what_a_killed_process_left_beside_a_folder_goes(tmp_path, there):
+    """It wrote beside the folder, which was not there yet, or into it."""
+    ended = subprocess.Popen([sys.executable, "-S", "-c", ""])
+    ended.wait()
+    out = tmp_path / "out"
+    out.mkdir()
+    left = (out if there else tmp_path) / f".softstart-{socket.gethostname()}-{ended.pid}-0123abcd.part"
+    left.mkdir()
+    with output_folder(str(out)):
+        assert not left.exists()
 
 
 def test_folders_made_at_once_are_not_taken_from_one_another(tmp_path):
