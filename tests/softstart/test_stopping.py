@@ -20,7 +20,8 @@ from softstart.stopping import STOPPING, at_stop, stop_now
 try:
     with at_stop(lambda: print("before", flush=True)):
         pass
-    with at_stop(lambda: print("outer", flush=True)), at_stop(lambda: print("inner", flush=True)):
+    fails = at_stop(lambda: 1 / 0)
+    with at_stop(lambda: print("outer", flush=True)), fails, at_stop(lambda: print("inner", flush=True)):
         STOPPING.set()
         raise KeyboardInterrupt
 except KeyboardInterrupt:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import socket
@@ -16,6 +17,7 @@ from contextlib import closing
 import pytest
 
 from softstart.errors import DamagedWarning, InputError
+from softstart.input.files import write_whole
 from softstart.stopping import AT_STOP
 from softstart.store import PartStore, Target, fresh_folder
 from softstart.views.markdown import output_folder
@@ -196,6 +198,8 @@ def test_a_signal_closes_no_file_that_is_being_written(tmp_path, monkeypatch):
         monkeypatch.setattr("softstart.store.STOPPING", begun)
         with pytest.raises(KeyboardInterrupt):
             kept.add(PARTS[1])
+        with pytest.raises(KeyboardInterrupt):  # it may have been closed as one to which nothing belongs
+            kept.stay(True)
     assert found_in(path)[0] == PARTS[0]
 
 
@@ -239,6 +243,20 @@ def test_folders_of_another_user_and_another_computer_stay(tmp_path, monkeypatch
     with fresh_folder(tmp_path):
         assert theirs.is_dir()
         assert elsewhere.is_dir()
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), ValueError("a bug")])
+def test_a_file_that_could_not_be_written_is_as_before(tmp_path, error):
+    (tmp_path / "file").write_text("old")
+
+    def write(stream):
+        stream.write("new")
+        raise error
+
+    with pytest.raises((InputError, ValueError), match=r"left on device; nothing was left behind\.|a bug"):
+        write_whole(tmp_path / "file", write)
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "old"
 
 
 @pytest.mark.parametrize("there", [True, False])
