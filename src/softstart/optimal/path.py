@@ -152,10 +152,12 @@ class Path:
         damped = self._damped(search)
         first += [] if damped is None else [damped]
         best: Found | None = None
+        most, least = (3, 0.1 * ROUGH) if self.problem.minimise == "heat" else (2, ROUGH)
         for several in (first, later):
             after = [one for each in several if (one := search.step_down(search.play(search.onto(each))))]
             after.sort(key=Found.merit)
-            ended = [down for one in after[:2] if (down := search.down(one, least=ROUGH)) and down.near]
+            downs = [search.down(one, least=least) for one in after[:most]]
+            ended = [one for one in downs if one is not None and one.near]
             best = min([*ended, *([best] if best else [])], key=Found.merit, default=None)
             if self.easy(best):
                 break
@@ -178,7 +180,10 @@ class Path:
         """First demands of gentle starts, closed forms and pulses: the best, and others."""
         formulas = [seeds.pulse_coast_hold(search, player) for player in search.players]
         pulses = seeds.pulse_coast_level(search)
-        return [*pulses[:FIRSTS], *[one for one in formulas if one is not None]], pulses[FIRSTS:MORE]
+        first, later = [*pulses[:FIRSTS], *[one for one in formulas if one is not None]], pulses[FIRSTS:MORE]
+        if self.problem.minimise == "heat":  # the least one is near the constant torque of the same time
+            return [*seeds.constant(search), *first, *later], []
+        return first, later
 
     def followed(self, search: Descent, *neighbours: Found | None) -> Found | None:
         """The best of one descent from the demand of each neighbour, as it is or scaled in time."""

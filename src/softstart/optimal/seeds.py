@@ -79,6 +79,12 @@ def pulse_coast_level(search: Descent) -> list[TorqueProfile]:
     return [one for _, one in sorted(found, key=lambda one: one[0])]
 
 
+def constant(search: Descent) -> list[TorqueProfile]:
+    """The least constant torque that is in time, if there is one."""
+    level = _level(search, 0.0, 0.0, search.low)
+    return [] if level is None else [level[1]]
+
+
 def _first_contact(player: DemandSimulator, demand: TorqueProfile, until: float) -> float:
     """When a gap first closes, s; infinite if none does."""
     try:
