@@ -77,8 +77,9 @@ class Demand:
         time = self.time[np.repeat(steps, 2)] + np.tile([-BESIDE, BESIDE], steps.size) * self.unit
         added = before + 1 + np.arange(before.size)
         share = (time - self.time[before]) / (self.time[before + 1] - self.time[before])
-        weights = np.zeros((count + added.size, self.size))
-        weights[np.setdiff1d(np.arange(count + added.size), added), np.arange(count)] = self.high
+        weights, known = np.zeros((count + added.size, self.size)), np.ones(count + added.size, dtype=bool)
+        known[added] = False
+        weights[np.flatnonzero(known), np.arange(count)] = self.high
         weights[added, before] = (1.0 - share) * self.high
         weights[added, before + 1] = share * self.high
         torque = weights[:, :count] @ (self.torque / self.high)
@@ -88,4 +89,6 @@ class Demand:
             weights[:, count + number] -= weights[:, knots] * (slope[beside] * self.unit / self.high)
         for places in (added[0::2] + 1, added[0::2] + 2):  # the knots of the steps
             weights[places, count + number] += jump
-        return TorqueProfile(np.insert(self.time, before + 1, time), torque), weights
+        when = np.empty(known.size)
+        when[added], when[known] = time, self.time
+        return TorqueProfile(when, torque), weights

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import make_interp_spline
 
 from softstart.arrays import Indices, Matrix, Vector
-from softstart.controller import make_controller
+from softstart.controller import controller_class
 from softstart.drive.machine import Machine
 from softstart.kernel import records as rec
 from softstart.profile import TorqueProfile
@@ -125,7 +125,7 @@ class DemandSimulator:
         self._loads = float((masses["Mc"] + masses["active"]).sum())
 
     def _run(self, profile: TorqueProfile, until: float, room: int) -> tuple[StartRecorder, int]:
-        made: Any = make_controller("profile", {"profile": profile})
+        made: Any = controller_class("profile")(profile=profile)  # type: ignore[call-arg]
         recorder = StartRecorder(self.rows, int(made.sensors), room)
         return recorder, run_one(made, self.machine, recorder, until)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
@@ -50,12 +50,12 @@ class KernelInput:
     curves: NDArray[np.float64]  # (n, ., .): load curves
     tones: Matrix  # harmonics of exciting torques, the same for all starts
 
-    @property
+    @cached_property
     def machine(self) -> rec.MachineRecord:
         """The first row of `machines`, by names."""
         return self.machines[0].view(rec.MACHINE)[0]
 
-    @property
+    @cached_property
     def first(self) -> tuple[Vector, Matrix, Matrix, Matrix, Matrix]:
         """The first start, as `kernel.start.begin` takes it."""
         return self.machines[0], self.masses[0], self.shafts[0], self.curves[0], self.tones
