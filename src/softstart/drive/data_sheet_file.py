@@ -16,7 +16,7 @@ SHOWN_IN = {"kW": 1e3, "ms": 1e-3}  # units of a drive file that are not those o
 
 
 class Entry(NamedTuple):
-    """A line of a drive file: the value in SI at the motor shaft, its text, and its source."""
+    """A line of a drive file: its value, in SI at the motor or as text "at output", its text, its source."""
 
     value: float | str | None
     text: str
@@ -128,9 +128,11 @@ def output_entry(
     if not (is_geared(sheet) and behind):
         return entry(value, unit, source)
     at_output = float(side.gear.to_output(value, unit))
+    whole = shortest(at_output, unit, within=1e-12)
+    there = f"{whole if ' ' in whole else f'{whole} {unit}'} at output"
     if unit == "rad":  # as catalogues give a backlash
-        return Entry(value, f'"{Units("arcmin").shown(at_output, unit):.9g} arcmin at output"', source)
-    return Entry(value, f'"{quantity_text(at_output, unit, 6)} at output"', source)
+        return Entry(there, f'"{Units("arcmin").shown(at_output, unit):.9g} arcmin at output"', source)
+    return Entry(there, f'"{quantity_text(at_output, unit, 6)} at output"', source)
 
 
 def entry(value: float | str | None, unit: str = "", source: str = "") -> Entry:

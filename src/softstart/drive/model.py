@@ -106,7 +106,7 @@ class Drive(ParameterFile, Machine, library=library):
     """
 
     KIND: ClassVar[str] = "drive"
-    GEARED: ClassVar[frozenset[str]] = frozenset(("gear_ratio", "gear_efficiency"))
+    GEARED: ClassVar[frozenset[str]] = frozenset(("gear_ratio", "gear_efficiency", *LOAD))
     LIMITS_GIVEN: ClassVar[str] = "[limits] in the drive file"
     # as a chain has it
     motor_index, load_index = 0, 1
@@ -321,7 +321,7 @@ class Drive(ParameterFile, Machine, library=library):
         for describes, drive_of in OTHER_DOCUMENTS:
             if describes(document):
                 drive = drive_of(document, where)
-                return cls._made(drive.given(), Wording(where, style="toml"), [])
+                return cls._made(drive.written(), Wording(where, style="toml"), [])
         return super()._from_document(document, where, also)
 
     # ---- the drive changed -------------------------------------------------------------------------------
@@ -345,8 +345,9 @@ class Drive(ParameterFile, Machine, library=library):
     def _changed(self, changes: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake]) -> Self:
         """As any parameters; a stiffness that is set is known, and has no soft end."""
         also: dict[str, object] = {"soft_stiffness": None} if "stiffness" in changes else {}
-        if self.duty is not None and isinstance(gear := self._new_gear(changes), Gear):
-            also["duty"] = self.duty.through(gear)
+        duty = changes.get("duty", self.duty)
+        if isinstance(duty, Duty) and isinstance(gear := self._new_gear(changes), Gear):
+            changes = {**changes, "duty": duty.through(gear)}
         return super()._changed(also | dict(changes), wording, mistakes)
 
     @cached_property
@@ -368,7 +369,7 @@ class Drive(ParameterFile, Machine, library=library):
             raise InputError(f"{one}: the drive has no duty; add [[duty]] to its file." for one in settings)
         pairs = (one.partition("=") for one in settings)
         changes = {key.strip(): value.strip(" \"'") for key, _, value in pairs}
-        return Duty.from_toml(self.duty.to_toml(), also=changes)
+        return Duty.read_for(self, self.duty.text(self.gear), also=changes)
 
     # ---- what follows from the parameters, under the symbols of [G] --------------------------------------
 

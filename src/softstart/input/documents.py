@@ -18,6 +18,7 @@ import numpy as np
 
 from softstart.errors import MOST, InputError
 from softstart.hints import did_you_mean, nearest, term
+from softstart.input.gear import behind
 from softstart.input.parameters import Mistake, Parameter, Wording, meant_by
 from softstart.quantities import doubtful_comma, shortest, show
 
@@ -272,7 +273,8 @@ def table_text(table: DocumentTable, values: Mapping[str, object], *, units: boo
                 value = int(value)
             text = literal(value, p.unit, always=p.unit == "rad/s" and not units)
             unit = "" if p.unit == "1" or text.startswith('"') else f"{p.unit}: "
-            lines.append(f"{p.key} = {text}" + (f"  # {unit}{p.meaning}" if p.unit and units else ""))
+            meaning = p.meaning.removesuffix(" at the motor shaft") if behind(value) else p.meaning
+            lines.append(f"{p.key} = {text}" + (f"  # {unit}{meaning}" if p.unit and units else ""))
     return "\n".join(lines)
 
 

@@ -56,6 +56,16 @@ class Gear(NamedTuple):
         of_ratio, of_efficiency = POWERS.get(unit, (0, 0))
         return self.ratio**of_ratio * self.efficiency**of_efficiency if of_ratio else None
 
+    def like(self, other: Gear) -> bool:
+        """Whether all values go through the other as through this one: the same ratio, and factor of torques.
+
+        >>> lifted = Gear(40.0, 0.8, load=5.0)
+        >>> lifted.like(Gear(40.0, 0.8, load=7.0)), lifted.like(Gear(40.0, 0.8, load=-5.0))
+        (True, False)
+        """
+        both = zip((*self[:2], self.of_torques), (*other[:2], other.of_torques), strict=True)
+        return all(np.array_equal(mine, its) for mine, its in both)
+
     def to_motor(self, value: Any, unit: str) -> Any:
         """A value at the output, in its SI unit, at the motor shaft."""
         turns = POWERS[unit] == (-1, 0)
@@ -71,8 +81,10 @@ class Gear(NamedTuple):
         drives = np.asarray(value if self.load is None else self.load) < 0.0
         if POWERS[unit] != (1, 1) or not np.any(drives):
             return self.factor(unit)
+        if np.all(drives):
+            return self.ratio / self.efficiency
         either = np.where(drives, self.ratio / self.efficiency, self.factor(unit))
-        return either if either.ndim else float(either)
+        return either
 
     @property
     def of_torques(self) -> Any:

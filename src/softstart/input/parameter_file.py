@@ -16,6 +16,7 @@ from softstart.input.documents import (
     placed,
 )
 from softstart.input.files import Library
+from softstart.input.gear import Gear
 from softstart.input.parameter_set import ParameterSet
 from softstart.input.parameters import Mistake, Parameter, Wording, without_unit
 
@@ -115,8 +116,18 @@ class ParameterFile(ParameterSet):
     def to_toml(self) -> str:
         """The TOML text in SI units, which `from_toml` reads back to an equal object.
 
+        What was given "at output" of a gear is written as it was given.
+
         >>> from softstart import Drive
         >>> print(Drive.load("crane-4amtkf").to_toml().splitlines()[4])
         inertia = 0.035  # kg*m^2: inertia of the motor
         """
-        return document_text((table, holder.given()) for _, table, holder in self.blocks())
+        gear = self._gear_in(self.given())
+        return self.text(gear if isinstance(gear, Gear) else None)
+
+    def text(self, gear: Gear | None) -> str:
+        """As `to_toml`, to be read with this gear."""
+        return document_text(
+            (table, holder.given() if gear is None else holder.written())
+            for _, table, holder in self.blocks()
+        )

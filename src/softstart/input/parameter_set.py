@@ -180,7 +180,8 @@ class ParameterSet:
     it in sentences, as "a drive", and `SEVERAL` says what to do with several values for one. With `BATCH` its
     numbers may be arrays, which are read-only. Bare numbers of parameters in `USUAL` are refused in a file,
     see `without_unit`. The fields of a subclass with `kw_only=False` are positional arguments as well.
-    Values given "at output" are read again when one of those in `GEARED` is changed, as a ratio.
+    Values given "at output" are read again when one of those in `GEARED` is changed, as a ratio, or a load
+    that drives the motor from then on.
     """
 
     WHAT: ClassVar[str] = "a table"
@@ -318,6 +319,10 @@ class ParameterSet:
         fields, given = vars(self), vars(self)["_given"]
         return {name: fields[name] for name in self.FIELDS if name in given}
 
+    def written(self) -> dict[str, Any]:
+        """As `given`, with the values that were given "at output" as they were written there."""
+        return self.given() | vars(self)["_at_output"]
+
     def values(self) -> dict[str, Any]:
         """All parameters by name."""
         fields = vars(self)
@@ -333,21 +338,21 @@ class ParameterSet:
         return self._changed(changes, Wording(), [])
 
     def _changed(self, changes: Mapping[str, object], wording: Wording, mistakes: Iterable[Mistake]) -> Self:
-        known, written = self.given(), vars(self)["_at_output"]
-        given = known | written | dict(changes)
-        again = written if isinstance(self._new_gear(changes), Gear) else {}
+        known, given = self.given(), self.written() | dict(changes)
+        again = vars(self)["_at_output"] if isinstance(self._new_gear(changes), Gear) else {}
         known = {name: value for name, value in known.items() if name not in changes and name not in again}
         return self._made(given, wording, mistakes, known)
 
     def _new_gear(self, changes: Mapping[str, object]) -> Gear | str:
-        """The gear after these changes, for values "at output"; "" if it is the same, or wrong."""
+        """The gear after these changes, for values "at output"; "" if they go as before, or it is wrong."""
         changed = {name: changes[name] for name in self.GEARED & changes.keys()}
         with suppress(RefusedError):
             for name, value in changed.items():
                 if value is not None:
-                    read_value(self.PARAMETERS[name], value, batch=self.BATCH)
-            written = vars(self)["_at_output"]
-            return self._gear_in(self.given() | written | dict(changes)) if changed else ""
+                    read_value(self.PARAMETERS[name], value, batch=self.BATCH, gear=Gear(1.0))
+            if changed:
+                old, new = self._gear_in(self.given()), self._gear_in(self.written() | dict(changes))
+                return "" if isinstance(old, Gear) and isinstance(new, Gear) and old.like(new) else new
         return ""
 
     def through(self, gear: Gear) -> Self:
@@ -361,7 +366,7 @@ class ParameterSet:
         again, wrong = read_values(
             written, {name: self.PARAMETERS[name] for name in written}, Wording(), gear=gear
         )
-        return self._made(given | written, Wording(), wrong, given | again) if written else self
+        return self._made(self.written(), Wording(), wrong, given | again) if written else self
 
     def __eq__(self, other: object) -> bool:
         return self._content() == other._content() if type(other) is type(self) else NotImplemented

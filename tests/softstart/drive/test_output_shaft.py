@@ -18,6 +18,8 @@ from softstart.controller.recipe import Recipe
 from softstart.drive import PARAMETERS
 from softstart.drive.model import BY_PATH
 from softstart.drive.plausibility import plausibility_warnings
+from softstart.page.links import inputs_of, link_of
+from softstart.page.project import project_of
 from softstart.page.session import Session
 from softstart.project import Project
 from softstart.reporting.document import data_of
@@ -454,3 +456,95 @@ def test_without_a_gear_values_stay_until_there_is_one_again() -> None:
     with pytest.raises(InputError) as refused:
         drive.with_settings(["gear.ratio=many"])
     assert [one.partition(":")[0] for one in refused.value.sentences] == ['gear.ratio = "many"']
+
+
+@pytest.mark.parametrize("new", NEW_GEARS)
+def test_a_file_that_is_written_has_at_the_output_what_was_given_there(new: dict[str, str]) -> None:
+    drive = Drive.from_toml(AT_OUTPUT)
+    by_name = {f"gear_{key}": float(value) for key, value in new.items()}
+    written = Drive.from_toml(with_gear(AT_OUTPUT, new))
+    again = Drive.from_toml(drive.to_toml())
+    assert again == drive
+    assert again.to_toml() == drive.to_toml()
+    assert again.replace(**by_name) == written
+    assert 'inertia = "20 kg*m^2 at output"  # inertia of the load\n' in drive.to_toml()
+    page = Session(drive)
+    saved = Project.from_toml(project_of(page).to_toml())
+    linked = Session(Session().inputs.machine)
+    linked.restore(inputs_of(link_of(page.inputs), linked.inputs))
+    reopened = Session(saved)
+    for other in (reopened, linked):
+        other.set_all({f"gear.{key}": value for key, value in new.items()})
+    assert reopened.inputs.machine_with_duty == written
+    assert linked.inputs.machine == written.replace(duty=None)
+
+
+def test_a_file_without_a_gear_has_its_values_at_the_motor() -> None:
+    text = AT_OUTPUT.replace('output_torque = "950 N*m"\n', "").replace("efficiency = 0.95\n", "")
+    bare = Drive.from_toml(text).replace(gear_ratio=None)
+    assert Drive.from_toml(bare.to_toml()) == bare
+    assert "at output" not in bare.to_toml()
+
+
+@pytest.mark.parametrize(
+    ("setting", "old", "new"),
+    [
+        ("load.torque=-80 N*m at output", 'torque = "80 N', 'torque = "-80 N'),  # it drives the motor now
+        ("load.torque=-3", 'torque = "80 N*m at output"', "torque = -3"),
+        ("load.friction=3", "friction = 0.5", "friction = 3"),
+    ],
+)
+def test_a_load_that_turns_round_takes_limits_through_the_gear_as_in_the_file(
+    setting: str, old: str, new: str
+) -> None:
+    drive, written = Drive.from_toml(AT_OUTPUT), Drive.from_toml(AT_OUTPUT.replace(old, new))
+    assert drive.with_settings([setting]) == written
+    name, _, value = setting.partition("=")
+    assert drive.replace(**{name.replace(".", "_"): value}) == written
+    page = Session(drive)
+    page.set(name, value)
+    assert page.inputs.machine_with_duty == written
+
+
+def test_loads_of_both_signs_in_a_table_take_limits_through_the_gear_as_their_files() -> None:
+    text = AT_OUTPUT.partition("[limits.fatigue]")[0].replace("friction = 0.5\n", "")
+    drive = Drive.from_toml(text)
+    torques = [-3.0, -1.0, 2.0]
+    written = [drive.with_settings([f"load.torque={torque}"]) for torque in torques]
+    table = machine_table(drive, load_torque=torques)
+    assert [one.values() for one in table.elements()] == [one.values() for one in written]
+    curve = Drive.from_toml(AT_OUTPUT.partition("[[duty]]")[0])
+    lowered = machine_table(curve, load_torque=[-3.0, -2.0])
+    assert [one.fatigue_torque for one in lowered.elements()] == 2 * [
+        curve.replace(load_torque=-3.0).fatigue_torque
+    ]
+
+
+def test_a_step_of_a_duty_that_is_set_beside_the_gear() -> None:
+    drive = Drive.from_toml(AT_OUTPUT)
+    written = Drive.from_toml(with_gear(AT_OUTPUT, {"ratio": "20.0"}).replace("time = 3", "time = 5"))
+    assert drive.with_settings(["gear.ratio=20", "duty[2].time=5"]) == written
+    assert drive.with_settings(["duty[2].time=5"]).with_settings(["gear.ratio=20"]) == written
+    torque = drive.with_settings(["duty[4].torque=-50 N*m at output", "gear.ratio=20"])
+    assert torque == Drive.from_toml(with_gear(AT_OUTPUT, {"ratio": "20.0"}).replace('"-40', '"-50'))
+
+
+def test_another_ratio_of_a_data_sheet_is_as_in_its_file() -> None:
+    text = """
+    [motor]
+    rated_power = "3 kW"
+    rated_speed = "1410 rpm"
+    inertia = "0.0083 kg*m^2"
+    [gear]
+    ratio = 38.1
+    stiffness = "35 kN*m/rad"
+    backlash = "9 arcmin"
+    [load]
+    machine = "travel"
+    mass = "6.5 t"
+    diameter = "315 mm"
+    """
+    other = Drive.from_toml(text).replace(gear_ratio=20.0)
+    written = Drive.from_toml(text.replace("38.1", "20"))
+    names = ("stiffness", "gap", "load_inertia", "load_torque")
+    assert [getattr(other, name) for name in names] == [getattr(written, name) for name in names]
