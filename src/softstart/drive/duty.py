@@ -230,14 +230,14 @@ class Duty(ParameterFile, library=library):
 
     @classmethod
     def read_for(
-        cls, machine: Machine, text: str, where: str = "", also: Mapping[str, object] | None = None
+        cls, machine: Machine | None, text: str, where: str = "", also: Mapping[str, object] | None = None
     ) -> Duty:
-        """As `load_for`, from the text of a file."""
+        """As `load_for`, from the text of a file; without a machine to see whether it is right in itself."""
 
         class OfMachine(Duty):
             @classmethod
             def _gear_in(cls, given: Mapping[str, object]) -> Gear | str:
-                return machine.gear_with()
+                return Gear(1.0) if machine is None else machine.gear_with()
 
         duty = OfMachine.from_toml(text, where=where, also=also)
         return cls(duty.steps, shift=duty.shift)

@@ -275,7 +275,7 @@ class Project(ParameterFile, what="a project"):
                 _ = player.controller
         for duty in self.duties:
             with wrong.collect():
-                Duty.from_toml(duty.file, where=f'duty "{duty.name}"')
+                Duty.read_for(None, duty.file, f'duty "{duty.name}"')
         yield from wrong.sentences
         if not wrong.sentences:
             yield from self._names()

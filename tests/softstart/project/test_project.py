@@ -265,3 +265,18 @@ def test_a_logo_moves_with_the_file(tmp_path: Path) -> None:
     project = Project.open(tmp_path / "job.toml")
     assert project.logo.startswith("data:image/svg+xml;base64,")
     assert moved(project) == project
+
+
+@pytest.mark.parametrize("duty_first", [False, True])
+def test_a_duty_at_the_output_goes_through_the_gear_of_the_machine(tmp_path: Path, duty_first: bool) -> None:
+    geared = Drive.load("crane-4amtkf").replace(gear_ratio=40, gear_efficiency=0.8)
+    (tmp_path / "geared.toml").write_text(geared.to_toml())
+    step = '[[duty]]\ndo = "load"\ntorque = "96 N*m at output"\n'
+    (tmp_path / "carry.toml").write_text(step)
+    files = [str(tmp_path / name) for name in ("geared.toml", "carry.toml")]
+    project = Project.new(*files[:: -1 if duty_first else 1]).replace(duty="carry")
+    assert Project.from_toml(project.to_toml()).single().duty == Duty.read_for(geared, step)
+    assert project.single().duty.steps[0].torque == pytest.approx(3.0)
+    bare = Project.new("crane-4amtkf", files[1]).replace(duty="carry")
+    with pytest.raises(InputError, match=r'duty "carry": .duty. 1, torque = .* without gear.ratio nothing'):
+        bare.single()
