@@ -314,3 +314,18 @@ def test_csv_files_and_saved_results_know_no_shaft(tmp_path: Path) -> None:
     first, second = (pareto(one, [0.45], controllers=["direct"], save_to=state) for one in (drive, there))
     assert first.summary() == second.summary()
     assert "at the motor shaft" in first.points[0].bound_covers
+
+
+def test_the_parts_of_a_load_are_at_the_shaft_of_their_sum() -> None:
+    drive = Drive.load("crane-4amtkf").replace(
+        gear_ratio=40, gear_efficiency=0.8, load_torque=4.0, load_friction=1.5, start_position="mid-gap"
+    )
+    for units, said in (
+        ("", "Mc = 5.5 N m, 4 N m active and 1.5 N m friction"),
+        ("N m, at output", "Mc = 176 N m, 128 N m active and 48 N m friction"),
+        ("kN m, at output", "Mc = 0.176 kN m, 0.128 kN m active and 0.048 kN m friction"),
+    ):
+        seen = drive.replace(units=units)
+        assert said in "\n".join(machine_lines(seen))
+        page = html.unescape(report(seen, controllers=["ramp"], budget=0.0).to_html()).replace("\xa0", " ")
+        assert page.count(said.partition(", ")[2]) >= 2  # in the scheme, and in what the model leaves out

@@ -38,13 +38,6 @@ class TwoMasses(NamedTuple):
         """The torque that moves the load while the gap is open, in size, N m: 0 where friction holds it."""
         return max(abs(self.Mc - self.friction) - self.friction, 0.0)
 
-    @property
-    def kind(self) -> str:
-        """The parts of the load torque in words: "active", "reactive", or both with their size."""
-        if self.active and self.friction > 0.0:
-            return f"{self.Mc - self.friction:.4g} N m active and {self.friction:.4g} N m friction"
-        return "active" if self.active else "reactive"
-
 
 class Machine(ABC):
     """A machine that can be started: a `Drive` of two masses, or a `Chain` of many.

@@ -153,11 +153,15 @@ def seen(value: float, units: Units, si: str, text: Callable[[float], str] = dig
     return f"{text(float(units.shown(value, si)))} {unit(units.of(si))}"
 
 
+def exact(value: float, units: Units, si: str) -> str:
+    """As `seen`, in as many digits as in the terminal."""
+    return seen(value, units, si, lambda one: printed(short(one)))
+
+
 FILTERS = {
     "digits": digits, "fixed": fixed, "short": lambda value: printed(short(value)),
     "percent": percent, "listed": listed, "times": times, "factor": lives.factor,
-    "printed": printed, "fact": fact_of, "seen": seen,
-    "exact": lambda value, units, si: seen(value, units, si, lambda one: printed(short(one))),
+    "printed": printed, "fact": fact_of, "seen": seen, "exact": exact,
     "css_string": css_string,
     "capital": lambda text: text[0].upper() + text[1:], "short3": lambda value: f"{value:.3g}",
     "short4": lambda value: printed(short(float(f"{value:.4g}"))),
@@ -176,6 +180,7 @@ def templates() -> Environment:
         "SAME": choice.SAME, "HARMED": HARMED, "POSITIONS": drives.POSITIONS, "GAPS": choice.GAPS,
         "INERTIAS": choice.INERTIAS, "SLOW": SLOW, "TIGHT": limit.TIGHT, "RPM": RPM, "REACTS": REACTS,
         "DEFAULT_SLOPE": fatigue.DEFAULT_SLOPE,
+        "load_kind": lambda two, units: drives.load_kind(two, lambda one: exact(one, units, "N*m")),
     }  # fmt: skip
     return found
 

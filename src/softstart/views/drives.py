@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from softstart.chain.model import Chain
@@ -32,6 +32,7 @@ def drive_lines(machine: Any) -> list[str]:
     two, masses, motor = machine.lever_rule_model, machine.mass_names, machine.motor
     units = units_of(machine)
     J1, J2, c, gap, Mc = _values(two, units)
+    kind = load_kind(two, lambda torque: seen(torque, "N*m", units))
     named = f"  motor on {masses[machine.motor_index]}, load {masses[machine.load_index]}"
     if len(masses) == 2:
         Ms = math.nan if motor is None else float(motor.starting_torque)
@@ -39,7 +40,7 @@ def drive_lines(machine: Any) -> list[str]:
         parts = [
             f"  motor  J1 = {J1}{torque}",
             f"  shaft  c = {c}, gap = {gap}, contact law {machine.contact_laws[0]}",
-            f"  load   J2 = {J2}, Mc = {Mc}, {two.kind}",
+            f"  load   J2 = {J2}, Mc = {Mc}, {kind}",
             *([named] if masses != ("motor", "load") else []),
             *_there(machine, units),
         ]
@@ -70,6 +71,13 @@ VALUES = (("J1", "kg*m^2"), ("J2", "kg*m^2"), ("c", "N*m/rad"), ("gap", "rad"), 
 def _values(two: Any, units: Units) -> list[str]:
     """The values of two masses in these units."""
     return [seen(float(getattr(two, name)), si, units) for name, si in VALUES]
+
+
+def load_kind(two: Any, said: Callable[[float], str]) -> str:
+    """The parts of the load torque in words: "active", "reactive", or both with their size, as it is said."""
+    if two.active and two.friction > 0.0:
+        return f"{said(float(two.Mc - two.friction))} active and {said(float(two.friction))} friction"
+    return "active" if two.active else "reactive"
 
 
 def _there(machine: Machine, units: Units) -> Iterator[str]:
