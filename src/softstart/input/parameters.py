@@ -344,7 +344,9 @@ def at_motor(p: Parameter, value: object, gear: Gear | str = NO_GEAR) -> object:
     if p.at_output == "side" or isinstance(gear, str):
         raise RefusedError(OWN_SIDE if p.at_output == "side" else str(gear))
     if p.many and np.ndim(gear.of_torques):
-        raise RefusedError("one list cannot follow several gears; write it at the motor shaft")
+        geared = np.ndim(gear.ratio * gear.efficiency)
+        wrong = "several gears" if geared else "loads that drive the motor and others"
+        raise RefusedError(f"one list cannot follow {wrong}; write it at the motor shaft")
     number = parse(each if several else each[0], p.unit, infinite=p.infinite)
     return gear.to_motor(number, p.unit)
 

@@ -135,6 +135,10 @@ class Subject:
             parameter, single = current.parameter, isinstance(current.value, float)
             if (not parameter.unit and not parameter.choices) or parameter.table in INFORMATIVE_TABLES:
                 reason = f"the {parameter.meaning} changes no start; sweep another parameter"
+                if parameter.table == "gear":
+                    reason = (
+                        "all cells have one gear; sweep another parameter, or set the gear and sweep again"
+                    )
                 raise InputError(f"{key}: {reason}.")
             multiples = {"x": float(current.value)} if single and not parameter.many else {}
             return replace(parameter, name=key), multiples

@@ -129,6 +129,9 @@ def test_limits_are_read_with_units_written_back_and_change_no_start():
     assert one.trajectory.notes.tobytes() == other.trajectory.notes.tobytes()
     with pytest.raises(InputError, match=r"limits.shaft_torque: .* changes no start"):
         sweep("crane-4amtkf", "direct", {"limits.shaft_torque": [90, 100]})
+    geared = CRANE.replace(gear_ratio=20, gap="1 deg at output")  # for which a ratio does change starts
+    with pytest.raises(InputError, match=r"gear.ratio: all cells have one gear; .* or set the gear"):
+        sweep(geared, "direct", {"gear.ratio": [20, 40]})
 
 
 def test_a_shipped_name_goes_before_a_file_of_that_name(tmp_path, monkeypatch):

@@ -514,6 +514,10 @@ def test_loads_of_both_signs_in_a_table_take_limits_through_the_gear_as_their_fi
     table = machine_table(drive, load_torque=torques)
     assert [one.values() for one in table.elements()] == [one.values() for one in written]
     curve = Drive.from_toml(AT_OUTPUT.partition("[[duty]]")[0])
+    with pytest.raises(
+        InputError, match="one list cannot follow loads that drive the motor and others; write"
+    ):
+        machine_table(curve, load_torque=torques)
     lowered = machine_table(curve, load_torque=[-3.0, -2.0])
     assert [one.fatigue_torque for one in lowered.elements()] == 2 * [
         curve.replace(load_torque=-3.0).fatigue_torque
