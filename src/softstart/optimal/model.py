@@ -40,6 +40,7 @@ from softstart.optimal.search import BETWEEN, CALM, Found, Search
 from softstart.optimal.starts import DemandRun
 
 LOW = 0.6  # share of the peak from which rows are known at all
+MOST_ROWS = 60_000  # rows of shaft torques: where there are more, those between the maxima are thinned
 NEAR, THIN = 0.85, 3  # share of the peak from which rows are in a program; one of so many of them
 ROUNDS, CUTS, LET_THROUGH = 12, 12, 0.1  # of taking in rows; by what share of the decrease
 CLOSE = 0.25  # of the highest torque below the torque-speed curve: looked at
@@ -313,6 +314,13 @@ def _of_shafts(
         times = start.with_peaks(start.instants(search.step))
         T = start.trajectory.at(times)["T"]
         seen = np.flatnonzero((np.abs(T) > least).any(axis=1))
+    passage = np.cumsum(np.diff(seen, prepend=-2) != 1)
+    if (thin := seen.size * T.shape[1] // MOST_ROWS) > 1:
+        here = np.abs(T[seen])
+        before, after = np.roll(here, 1, axis=0), np.roll(here, -1, axis=0)
+        kept = ((here >= before) & (here >= after) & (here > least)).any(axis=1)
+        kept[::thin] = True
+        seen, passage = seen[kept], passage[kept]
     begin = start.contacts[0]
     marks = np.union1d(begin, [t_f])
     answer, states = start.by_demand(times[seen], marks)
@@ -323,5 +331,6 @@ def _of_shafts(
     order = np.lexsort((j, k))
     j, k = j[order], k[order]
     rows = np.sign(T[j, k])[:, None] * answer[j, k] / search.base
-    edges = np.append([True], (np.diff(k) != 0) | (np.diff(seen[j]) != 1))[: j.size]
+    apart = (np.diff(k) != 0) | (np.diff(j) != 1) | (np.diff(passage[j]) != 0)
+    edges = np.append([True], apart)[: j.size]
     return (rows, np.abs(T[j, k]) / search.base, edges), states[np.searchsorted(marks, t_f)]

@@ -7,7 +7,8 @@ the same times, and the better of both is kept, as a start serves every longer t
 not rise; an answer beside it is a descent of its own. Where K_dyn is at most 1 one search is enough.
 
 The shortest start is a descent on t_f. Its first demands are the quickest of many that switch between the
-limits of the torque at random instants, by their exact starts.
+limits of the torque at random instants, by their exact starts; under a torque-speed curve also the largest
+torque of a rigid drive.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from softstart.optimal.descent import Descent
 from softstart.optimal.problem import Objective, Problem
 from softstart.optimal.search import Found
 from softstart.optimal.starts import DemandSimulator
-from softstart.optimal.torque_speed import rigid_start_time
+from softstart.optimal.torque_speed import RigidStart, rigid_start_time
 from softstart.profile import TorqueProfile
 
 SAMPLES, TASTED, FINISHED = 100, 10, 4  # first demands: played, tasted in each order, followed to the end
@@ -108,6 +109,8 @@ class Path:
             return None
         span = min(max(1.2 * full.end, 0.6 * latest), latest)
         switching = [TorqueProfile([0.0], [search.high]), *seeds.switching(search, span, SAMPLES)]
+        if curve := self.problem.torque_speed:
+            switching += [one for each in self.problem.machines if (one := RigidStart(each, curve).torque)]
         return self.quickest(search, switching, () if self._gentle else self.gentle_firsts(search)[0])
 
     def quickest(

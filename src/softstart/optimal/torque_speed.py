@@ -20,8 +20,10 @@ from softstart.arrays import Vector
 from softstart.kernel.records import CURVE, MASS
 from softstart.optimal.problem import Problem
 from softstart.optimal.result import Infeasibility, InfeasibleError
+from softstart.profile import TorqueProfile
 from softstart.start.kernel_input import kernel_input
 
+FINE = 60  # speeds at which a torque over time has knots
 Corners = tuple[tuple[float, float], ...]
 
 
@@ -84,14 +86,30 @@ class RigidStart:
     @property
     def time(self) -> float:
         """How long it takes, s; infinite where the load takes all torque at some speed."""
-        speeds = self.speeds
+        return float(self._instants(self.speeds)[-1])
+
+    def _instants(self, speeds: Vector) -> Vector:
+        """When it has these speeds, which rise from that at the beginning, s."""
         left = self.motor(speeds) - self.load(speeds)
         if not (left > 0.0).all() or not math.isfinite(self.J):
-            return math.inf
+            return np.append(0.0, np.full(speeds.size - 1, math.inf))
         ratio, rise = np.diff(np.log(left)), np.diff(left)
         even = np.abs(rise) <= 1e-9 * left[1:]  # then the logarithm is lost in rounding
         one_over_mean = np.where(even, 2.0 / (left[1:] + left[:-1]), ratio / np.where(even, 1.0, rise))
-        return float(self.J * np.sum(np.diff(speeds) * one_over_mean))
+        return np.append(0.0, np.cumsum(self.J * np.diff(speeds) * one_over_mean))
+
+    @property
+    def torque(self) -> TorqueProfile | None:
+        """The largest torque over time; None where it does not come to its speed.
+
+        >>> from softstart import Drive
+        >>> start = RigidStart(Drive.load("crane-4amtkf"), ((0.0, 62.0), (92.153, 10.0)))
+        >>> start.torque.at([0.0, start.time]).round(1).tolist()
+        [62.0, 10.0]
+        """
+        speeds = np.union1d(self.speeds, np.linspace(self.begin, self.end, FINE))
+        when = self._instants(speeds)
+        return TorqueProfile(when, self.motor(speeds)) if math.isfinite(when[-1]) else None
 
 
 def rigid_start_time(problem: Problem) -> float:

@@ -177,3 +177,23 @@ def test_limits_of_torque_and_rate_are_kept() -> None:
     assert torque.min() >= -10.0
     assert torque.max() <= 62.0
     assert np.abs(np.diff(torque) / np.diff(time)).max() <= 2000.0 * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", ["reached, lag", "chain"])
+def test_thinned_rows_of_torques_have_the_same_maxima(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A long chain would have half a million rows; maxima and the passages between openings stay."""
+    search = of(CASES[name])
+    found = begun(search)
+    whole = Model(search, found).shafts
+    monkeypatch.setattr("softstart.optimal.model.MOST_ROWS", whole.values.size // 5)
+    thinned = Model(search, found).shafts
+    assert 2 * thinned.values.size < whole.values.size
+    assert thinned.edges.sum() <= whole.edges.sum()
+    maxima = whole.peaks(whole.values)
+    assert np.isin(whole.values[maxima], thinned.values[thinned.peaks(thinned.values)]).all()
+    by_thinned = search.down(found.profile)
+    monkeypatch.undo()
+    by_whole = search.down(found.profile)
+    assert by_thinned is not None
+    assert by_whole is not None
+    assert by_thinned.peak == pytest.approx(by_whole.peak, rel=5e-4)  # each ends within some 1e-4
