@@ -318,8 +318,8 @@ def _of_shafts(
     if (thin := seen.size * T.shape[1] // MOST_ROWS) > 1:
         here = np.abs(T[seen])
         before, after = np.roll(here, 1, axis=0), np.roll(here, -1, axis=0)
-        kept = ((here >= before) & (here >= after) & (here > least)).any(axis=1)
-        kept[::thin] = True
+        maxima = ((here >= before) & (here >= after) & (here > least)).any(axis=1)
+        kept = np.union1d(np.flatnonzero(maxima), np.arange(0, seen.size, thin))
         seen, passage = seen[kept], passage[kept]
     begin = start.contacts[0]
     marks = np.union1d(begin, [t_f])
