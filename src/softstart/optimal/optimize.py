@@ -16,7 +16,7 @@ from softstart.drive.machine import Machine
 from softstart.errors import InputError, SimulationError
 from softstart.optimal import pulse_coast_hold
 from softstart.optimal.bounds import least_heat, momentum_bound, momentum_shortest_time
-from softstart.optimal.check import ROUNDING, check, replayed
+from softstart.optimal.check import check, replayed
 from softstart.optimal.descent import Descent
 from softstart.optimal.path import EDGE, Path
 from softstart.optimal.problem import USUAL, Objective, Problem, StartTime, Terminal
@@ -231,9 +231,6 @@ def _checked(
         problem if problem.start_time else replace(problem, start_time=end, minimise="k_dyn", k_dyn=None)
     )
     check(problem, profile, runs, end, claimed, bound)
-    latest = max(run.start_time for run in runs)
-    if problem.terminal == "reached" and latest <= end * (1.0 + ROUNDING):
-        end = latest  # the search asks that all loads have their speeds at one instant
     least = least_heat(problem) if problem.minimise == "heat" else 0.0
     return Optimum(
         problem, profile, runs, bound, method, why, claimed, end, heat_at_least=least,
